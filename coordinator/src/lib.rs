@@ -4,7 +4,7 @@
 //! through an [`observer::Observer`]. Several live side by side in one process; there are no globals.
 //!
 //! Each part is a crate of its own below `coordinator/`; this one gives them one name. Without the feature `program`
-//! neither the command line nor recordings nor the checker are compiled.
+//! neither recordings nor the checker nor the modules that come with the program are compiled.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]
@@ -27,6 +27,8 @@ pub use terraglue_world as world;
 
 #[cfg(feature = "program")]
 pub use terraglue_checkpoint as checkpoint;
+#[cfg(feature = "program")]
+pub use terraglue_compare as compare;
 #[cfg(feature = "program")]
 pub use terraglue_conformance as conformance;
 #[cfg(feature = "program")]

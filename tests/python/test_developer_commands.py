@@ -40,4 +40,4 @@ def test_what_cargo_xtask_starts_hands_on_all_but_installing(tmp_path):
                            env={**os.environ, "CARGO": "/bin/false"}, timeout=60)
     assert built.returncode == 1 and not (tmp_path / "x").exists()
     lines = [line for line in built.stderr.splitlines() if line.startswith("$")]
-    assert lines == ["$ false build --release --package terraglue --package terraglue-fmu-library"]
+    assert lines == ["$ false build --release --package terraglue-cli --package terraglue-fmu-library"]

@@ -221,12 +221,9 @@ fn uses(source: &Source, own: &[String], modules: &[Vec<String>]) -> BTreeSet<us
     let mut found = BTreeSet::new();
     let code = source.lines.iter().map(|line| line.split("//").next().unwrap_or_default());
     let text = code.collect::<Vec<_>>().join("\n");
-    for (start, _) in text.match_indices("crate::").chain(text.match_indices("super::")) {
-        let path: String =
-            text[start..].chars().take_while(|c| c.is_alphanumeric() || matches!(c, '_' | ':')).collect();
-        if text[..start].ends_with("super::") {
-            continue;
-        }
+    let starts = text.match_indices("crate::").chain(text.match_indices("super::"));
+    let starts = starts.filter(|(start, _)| !text[..*start].ends_with("super::"));
+    for path in starts.flat_map(|(start, _)| paths(&text[start..])) {
         let mut at = if path.starts_with("crate") { Vec::new() } else { own.to_vec() };
         for part in path.split("::").filter(|p| !p.is_empty()) {
             match part {
@@ -241,6 +238,29 @@ fn uses(source: &Source, own: &[String], modules: &[Vec<String>]) -> BTreeSet<us
         found.extend(target.filter(|k| apart(&modules[*k])));
     }
     found
+}
+
+/// The paths at the head of a text: one, or those of a group in braces.
+fn paths(text: &str) -> Vec<String> {
+    let end = text.find(|c: char| !c.is_alphanumeric() && c != '_' && c != ':').unwrap_or(text.len());
+    let (stem, rest) = text.split_at(end);
+    let Some(group) = rest.strip_prefix('{').filter(|_| stem.ends_with("::")) else {
+        return vec![stem.to_owned()];
+    };
+    let (mut all, mut depth, mut first) = (Vec::new(), 0, 0);
+    for (k, c) in group.char_indices() {
+        if depth == 0 && matches!(c, ',' | '}') {
+            all.extend(paths(group[first..k].trim()).into_iter().map(|path| format!("{stem}{path}")));
+            first = k + 1;
+        }
+        match c {
+            '}' if depth == 0 => break,
+            '}' => depth -= 1,
+            '{' => depth += 1,
+            _ => {}
+        }
+    }
+    all
 }
 
 #[cfg(test)]
@@ -272,6 +292,13 @@ mod tests {
         ];
         assert_eq!(files_in_cycles(&cycle), 2);
         assert_eq!(files_in_cycles(&cycle[..2]), 0);
+    }
+
+    #[test]
+    fn a_group_in_braces_names_each_of_its_files() {
+        assert_eq!(paths("super::{a::{B, self}, c::D}; x"), ["super::a::B", "super::a::self", "super::c::D"]);
+        let grouped = source("a.rs", "use super::{\n    Top,\n    b::B,\n};");
+        assert_eq!(files_in_cycles(&[grouped, source("b.rs", "use crate::a::A;")]), 2);
     }
 
     #[test]

@@ -13,10 +13,10 @@ use plan::Plan;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use terraglue_compare::{self as side_by_side, COMPARE_JSON, COMPARE_PAGE, CompareRow};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::observer::Observer;
 use terraglue_recording as recording;
-use terraglue_recording::compare::{self, COMPARE_JSON, COMPARE_PAGE, CompareRow};
 use terraglue_recording::{Status, SummaryObserver};
 use terraglue_scenario::keys::STRATEGIES;
 
@@ -49,7 +49,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     bar.finish_and_clear();
     warnings.tell();
     judge(&mut rows, arguments)?;
-    compare::write(&folder, &rows)?;
+    side_by_side::write(&folder, &rows)?;
     print(arguments, &folder, &rows)?;
     // what is interrupted while it loads is no wrong value
     let is_wrong = !cancel.load(Ordering::Relaxed) && tell_wrong(&plans);
@@ -123,11 +123,11 @@ fn announced(plans: &[Plan]) -> String {
 fn judge(rows: &mut [CompareRow], arguments: &CompareArguments) -> Result {
     let Some(reference) = &arguments.reference else { return Ok(()) };
     if !STRATEGIES.contains(&reference.as_str()) {
-        return compare::judge(rows, None, Path::new(reference));
+        return side_by_side::judge(rows, None, Path::new(reference));
     }
     let runs = rows.iter().filter(|r| r.is_reference && r.failure().is_none()).cloned();
     let runs: Vec<(CompareRow, PathBuf)> = runs.filter_map(|r| Some((r.clone(), r.folder?))).collect();
-    runs.iter().try_for_each(|(run, folder)| compare::judge(rows, Some(run), folder))
+    runs.iter().try_for_each(|(run, folder)| side_by_side::judge(rows, Some(run), folder))
 }
 
 /// Longest part of the name of a folder that a value takes.
@@ -257,9 +257,9 @@ fn print(arguments: &CompareArguments, folder: &Path, rows: &[CompareRow]) -> Re
         let at = |source| Error::File { path: path.display().to_string(), source };
         outln!("{}", std::fs::read_to_string(&path).map_err(at)?.trim_end());
     } else if !arguments.run.quiet {
-        outln!("{}", compare::terminal_table(rows, false));
+        outln!("{}", side_by_side::terminal_table(rows, false));
         if arguments.details {
-            outln!("{}", compare::terminal_table(rows, true));
+            outln!("{}", side_by_side::terminal_table(rows, true));
         }
         outln!("comparison: {}", folder.join(COMPARE_PAGE).display());
     }

@@ -2,8 +2,8 @@
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use terraglue_compare::COMPARE_JSON;
 use terraglue_diagnostics::{Error, Result};
-use terraglue_recording::compare::COMPARE_JSON;
 use terraglue_recording::{RECORDING, SUMMARY};
 use terraglue_scenario::InputError;
 

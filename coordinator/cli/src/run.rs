@@ -53,18 +53,7 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let interrupt = Interrupt::listen();
     let mut options = options(arguments, &interrupt.flag());
     let checkpoint = command.resume.as_deref().map(|folder| resumable(folder, &mut options)).transpose()?;
-    let scenario = match &checkpoint {
-        Some(checkpoint) => {
-            let scenario = checkpoint.scenario()?;
-            checkpoint.check(&scenario, &options)?;
-            scenario
-        }
-        None => {
-            let scenario = strict::load(&arguments.scenario, &arguments.sets(), command.strict)?;
-            soil_module::check(&scenario, &arguments.scenario)?;
-            scenario
-        }
-    };
+    let scenario = scenario(command, checkpoint.as_ref(), &options)?;
     let loading = Waiting::loading(arguments.quiet);
     let mut testbed = build(&scenario, &options)?;
     drop(loading);
@@ -113,6 +102,19 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
         eprintln!("`terraglue run --resume {}` goes on from here", folder.display());
     }
     ended(report, &outcome, &folder)
+}
+
+/// The scenario of a run, or of the one that goes on.
+fn scenario(command: &RunCommand, checkpoint: Option<&Checkpoint>, options: &Options) -> Result<Scenario> {
+    if let Some(checkpoint) = checkpoint {
+        let scenario = checkpoint.scenario()?;
+        checkpoint.check(&scenario, options)?;
+        return Ok(scenario);
+    }
+    let arguments = &command.run;
+    let scenario = strict::load(&arguments.scenario, &arguments.sets(), command.strict)?;
+    soil_module::check(&scenario, &arguments.scenario)?;
+    Ok(scenario)
 }
 
 /// How the program ends where the report was made, or not, or not wanted.
@@ -224,10 +226,7 @@ pub fn run_testbed(
     let goes_on = resumed.is_some();
     let mut clock = RunClock::default();
     let recorder = match resumed {
-        None => {
-            let options = RecorderOptions { csv, checkpoints: keeper.is_some() };
-            Recorder::create(folder, scenario, options)?
-        }
+        None => Recorder::create(folder, scenario, RecorderOptions { csv, checkpoints: keeper.is_some() })?,
         Some(mut resumed) => {
             clock.before = std::mem::take(&mut resumed.timing);
             resumed.recorder(folder, scenario, &testbed)?
@@ -267,17 +266,22 @@ pub fn run_testbed(
     let closed = testbed.close();
     set_back(&process_state);
     let error = error.or(closed.err());
-    let status = match &error {
-        Some(_) => Status::Failed,
-        None if cancelled => Status::Stopped,
-        None => Status::Done,
-    };
     drop(exit_hook);
+    let status = status(error.as_ref(), cancelled);
     let summary = recorder.lock().finish(wall_s, cpu_s, error.as_ref(), status)?;
     if summary.status == Status::Done {
         keeper.iter().for_each(Keeper::remove);
     }
     Ok(Outcome { summary, error, parts_s, costs })
+}
+
+/// How a run has ended.
+fn status(error: Option<&Error>, cancelled: bool) -> Status {
+    match error {
+        Some(_) => Status::Failed,
+        None if cancelled => Status::Stopped,
+        None => Status::Done,
+    }
 }
 
 /// Wall time per step of the exchange with the subsystems, of Jacobians, and of all else, recording included, s.

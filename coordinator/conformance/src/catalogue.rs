@@ -6,7 +6,7 @@ use super::definition::Test;
 /// All tests in an order in which every test comes after those that it builds on.
 pub fn catalogue() -> &'static [Test] {
     static ALL: std::sync::OnceLock<Vec<Test>> = std::sync::OnceLock::new();
-    ALL.get_or_init(|| areas::ALL.iter().flat_map(|list| list()).collect())
+    ALL.get_or_init(|| areas::ALL.iter().flat_map(|list| list.iter().copied()).collect())
 }
 
 #[cfg(test)]

@@ -26,17 +26,19 @@ mod options;
 mod other_process;
 mod report;
 mod sanitize;
+mod scope;
 mod supervisor;
 mod test_context;
 
 pub use catalogue::catalogue;
-pub use definition::{Area, Level, Test};
+pub use definition::Test;
 pub use finding::{Finding, Outcome, Stop, Verdict};
 pub use last::{LastCheck, last_check, remember};
 pub use options::Options;
 pub use other_process::{RemoteRun, run_remote};
 pub use report::{Report, TestResult};
 pub use sanitize::{Fault, Sanitized, sanitize, sources_of};
+pub use scope::{Area, Level};
 pub use supervisor::{Told, check};
 pub use test_context::TestContext;
 

@@ -1,6 +1,6 @@
 //! How the tests are run.
 
-use super::definition::Level;
+use super::scope::Level;
 use std::path::PathBuf;
 
 /// How the tests are run.

@@ -2,10 +2,11 @@
 
 use super::catalogue::catalogue;
 use super::check_file::CheckFile;
-use super::definition::{Area, Test};
+use super::definition::Test;
 use super::finding::{Finding, Outcome};
 use super::options::Options;
 use super::report::{Report, TestResult};
+use super::scope::Area;
 use super::{Level, unknown};
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;

@@ -3,7 +3,7 @@
 use super::check_file::CheckFile;
 use super::finding::{Stop, Verdict};
 use super::fixture::Flat;
-use super::{Level, definition::Area};
+use super::scope::{Area, Level};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -269,7 +269,7 @@ impl FmuSubsystem {
         }
         self.open = true;
         if self.clocks && !begins {
-            self.instance.forget_ticks();
+            self.instance.clocks_mut().forget_ticks();
         }
         if self.has_bodies {
             self.prove(step, wrench)?;
@@ -462,7 +462,7 @@ impl Subsystem for FmuSubsystem {
     fn commit(&mut self, _: &Step, _: &[f64], _: &Motion) -> Result {
         self.open = false;
         if self.clocks {
-            self.instance.forget_triggers();
+            self.instance.clocks_mut().forget_triggers();
         }
         Ok(())
     }

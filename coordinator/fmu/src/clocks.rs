@@ -2,7 +2,7 @@
 //! ticks when the next step begins; inputs of a clock take their values then.
 
 use super::map::ValueLocation;
-use terraglue_fmi::{Error as FmiError, FmuInstance, Result as FmiResult};
+use terraglue_fmi::{Error as FmiError, FmuInstance, ForeignInstance, Result as FmiResult};
 use terraglue_subsystem::{Error, Result, Values, ValuesMut};
 
 /// How an error of an FMU becomes one of the subsystem.
@@ -26,7 +26,7 @@ pub fn get(
     }
     for (place, out) in places.iter().zip(out.iter_mut()) {
         *out = if place.clock {
-            instance.ticks(place.reference)
+            instance.clocks().ticks(place.reference)
         } else {
             let mut whole = vec![false; place.count as usize];
             instance.get(&[place.reference], ValuesMut::Bool(&mut whole)).map_err(fail)?;
@@ -46,8 +46,7 @@ pub fn set(
     if let (Values::Bool(values), true) = (values, places.iter().all(|p| p.clock)) {
         for (place, on) in places.iter().zip(*values) {
             let clock = instance.description().variables[place.variable as usize].clone();
-            instance.can_trigger(&clock).map_err(fail)?;
-            instance.trigger(place.reference, *on);
+            instance.trigger(&clock, *on).map_err(fail)?;
         }
         return Ok(true);
     }
@@ -58,7 +57,7 @@ pub fn set(
         ($variant:ident, $all:expr) => {
             for (place, value) in places.iter().zip($all.iter().cloned()) {
                 let reference = place.reference;
-                instance.hold(reference, move |instance: &FmuInstance| -> FmiResult {
+                instance.clocks_mut().hold(reference, move |instance: &ForeignInstance| -> FmiResult {
                     instance.set(&[reference], Values::$variant(std::slice::from_ref(&value)))
                 });
             }

@@ -5,7 +5,7 @@ use super::map::{element_name, find};
 use super::table::Table;
 use std::sync::Arc;
 use terraglue_fmi::description::Variable;
-use terraglue_fmi::{Error, FmuInstance, ModelDescription, Result, Version};
+use terraglue_fmi::{Error, FmuInstance, ForeignInstance, ModelDescription, Result, Version};
 use terraglue_subsystem::{ValueType, Values};
 
 /// All that a table feeds.
@@ -127,7 +127,7 @@ impl Inputs {
             if slope.is_finite() { Ok(slope) } else { Err(self.table.none(*column, end)) }
         };
         let slopes = self.columns.iter().map(slope).collect::<Result<Vec<f64>>>()?;
-        instance.set_slopes(&self.slopes, &slopes)
+        instance.foreign().set_slopes(&self.slopes, &slopes)
     }
 }
 
@@ -157,13 +157,12 @@ impl Input {
     fn set(&self, instance: &mut FmuInstance, table: &Table, t: f64) -> Result {
         let (v, column, reference) = (&self.variable, self.last(), [self.variable.reference]);
         if v.value_type == ValueType::Clock {
-            instance.can_trigger(v)?;
-            instance.trigger(v.reference, matches!(table.cell(t, column), "1" | "true"));
+            instance.trigger(v, matches!(table.cell(t, column), "1" | "true"))?;
             return Ok(());
         }
-        if instance.waits_for_clock(v.reference) {
+        if instance.clocks().waits_for_clock(v.reference) {
             let (v, cell) = (v.clone(), table.cell(t, column).to_owned());
-            instance.hold(v.reference, move |instance| set_text(instance, &v, &cell));
+            instance.clocks_mut().hold(v.reference, move |instance| set_text(instance, &v, &cell));
             return Ok(());
         }
         match v.value_type {
@@ -172,7 +171,7 @@ impl Input {
                 let narrow: Vec<f32> = self.numbers(table, t)?.into_iter().map(|x| x as f32).collect();
                 instance.set(&reference, Values::F32(&narrow))
             }
-            _ => set_text(instance, v, table.cell(t, column)),
+            _ => set_text(instance.foreign(), v, table.cell(t, column)),
         }
     }
 
@@ -196,7 +195,7 @@ impl Input {
 }
 
 /// Sets a variable from text; arrays take their elements separated by spaces.
-pub fn set_text(instance: &FmuInstance, v: &Variable, text: &str) -> Result {
+pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result {
     let wrong =
         || Error::WrongInput(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
     let words: Vec<&str> = text.split_whitespace().collect();

@@ -113,7 +113,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let end = if whole { end } else { end.min(stop) };
         let at = |e: Error| named(e, t);
         inputs.set(&mut instance, t).map_err(at)?;
-        instance.forget_ticks();
+        instance.clocks_mut().forget_ticks();
         let events;
         let step = halving(&mut instance, &inputs, &mut before, (t, end), &mut tables.intermediate);
         (ended, events) = step.map_err(|e| at(inputs.way_out(e, end)))?;
@@ -165,7 +165,7 @@ fn initialize(instance: &mut FmuInstance, settings: &Settings, (start, stop): (f
     for (name, text) in &settings.start {
         let v = find(&description, name)?;
         if v.causality != Causality::StructuralParameter {
-            set_text(instance, v, text)?;
+            set_text(instance.foreign(), v, text)?;
         }
     }
     let tolerance = settings.tolerance.or(description.experiment.tolerance);
@@ -223,7 +223,7 @@ fn halving(
             }
         }
         if made.is_ok() {
-            instance.forget_triggers();
+            instance.clocks_mut().forget_triggers();
         }
         match made {
             Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
@@ -350,7 +350,7 @@ fn read(instance: &FmuInstance, v: &Variable) -> Result<Vec<String>> {
         ValueType::Binary => values!(Binary, Vec::new(), |x: &Vec<u8>| {
             x.iter().map(|b| format!("{b:02x}")).collect::<String>()
         }),
-        ValueType::Clock => Ok(vec![u8::from(instance.ticks(v.reference)).to_string()]),
+        ValueType::Clock => Ok(vec![u8::from(instance.clocks().ticks(v.reference)).to_string()]),
     }
 }
 

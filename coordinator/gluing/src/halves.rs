@@ -52,14 +52,6 @@ impl InterfaceProblem {
         }
     }
 
-    /// X1 = h·V1 and X2 = h·V2 with the velocities of t, which `set_ports` answered.
-    pub fn start_at_constant_velocity(&mut self) {
-        self.read_velocities();
-        let h = self.at.h;
-        self.first.x.iter_mut().zip(&self.first.v).for_each(|(x, v)| *x = h * v);
-        self.second.x.iter_mut().zip(&self.second.v).for_each(|(x, v)| *x = h * v);
-    }
-
     /// x_free and G1 as the bodies are under the present T: x1 − G1·T.
     ///
     /// # Errors

@@ -46,7 +46,7 @@ impl GroundPoints {
             (1..).find(|n: &u32| nodes / (u64::from(*n) * u64::from(*n)) <= MOST_POINTS).unwrap_or(1);
         let step = libm::exp2(libm::floor(libm::log2(info.spacing / 64.0)));
         let share = |k: usize| (k as f64 / (SHADES - 1) as f64) * 2.0 - 1.0;
-        let palette = Palette::new();
+        let palette = Palette::default();
         let colours = (0..SHADES).map(|k| palette.to_rgb(palette.colour(share(k)))).collect();
         Self { info: info.clone(), edge, stride, columns: tiles(edge)[0], step, colours }
     }

@@ -56,7 +56,7 @@ pub fn at(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
 }
 
 /// The same for an error of another library.
-pub(crate) fn other_at<E>(path: &Path) -> impl Fn(E) -> Error + '_
+pub fn other_at<E>(path: &Path) -> impl Fn(E) -> Error + '_
 where
     E: Into<Box<dyn std::error::Error + Send + Sync>>,
 {

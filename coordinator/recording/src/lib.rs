@@ -1,4 +1,4 @@
-//! Recordings of a run: written while it goes, read back, summed up, turned into a report and compared.
+//! Recordings of a run: written while it goes, read back, summed up and turned into a report.
 //!
 //! [`Recorder`] follows a testbed as an [`Observer`](terraglue_engine::observer::Observer) and fills one folder:
 //!
@@ -19,7 +19,8 @@
 //! names, strategy and modules.
 //!
 //! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
-//! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
+//! [`report::write`] makes the report from it;
+//! the crate `terraglue-compare` puts several runs side by side.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]
@@ -66,7 +67,6 @@ mod trace;
 mod viewer_layout;
 mod visibility;
 
-pub mod compare;
 pub mod report;
 
 #[cfg(test)]
@@ -78,8 +78,8 @@ pub use energies::Energies;
 pub use exchange::write_exchange;
 pub use inputs::fingerprints;
 pub use kept_file::KeptFile;
-pub use layout::at;
 pub use layout::{CHECKPOINT, FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
+pub use layout::{at, other_at};
 pub use mend::{has_end, mend};
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording};

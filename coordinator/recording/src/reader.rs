@@ -183,7 +183,7 @@ fn ground(data: &[u8], t_s: f64) -> Option<GroundRecord> {
 
 impl Recording {
     /// The first record after a step: in the one before it nobody has told a force, which is no 0 N.
-    pub(crate) fn first_step(&self) -> usize {
+    pub fn first_step(&self) -> usize {
         self.gluing.iter().position(|g| g.evaluations_bodies > 0).unwrap_or(0)
     }
 

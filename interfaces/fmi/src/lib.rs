@@ -33,4 +33,7 @@ pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
 pub use fmu::Fmu;
 pub use folder::{Folder, remove_folders};
-pub use instance::{Advance, FmuInstance, FmuState, InstanceOptions, IntermediateRow, LogLine, Stepped};
+pub use instance::{
+    Advance, Clocks, FmuInstance, FmuState, ForeignInstance, InstanceOptions, IntermediateRow, LogLine,
+    Stepped,
+};

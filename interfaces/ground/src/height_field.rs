@@ -199,16 +199,6 @@ impl HeightField {
         self.add_units(i, j, units - self.units(i, j));
     }
 
-    /// Adds 32 × 32 changes in units to a tile, x fastest; those of nodes beyond the lattice must be 0.
-    pub fn add_tile(&mut self, tile: usize, changes: &[i32]) {
-        if changes.iter().all(|c| *c == 0) {
-            return;
-        }
-        let (heights, sinkage) = self.touch(tile);
-        self.pool.tile_mut(heights).iter_mut().zip(changes).for_each(|(h, c)| *h += c);
-        self.pool.tile_mut(sinkage).iter_mut().zip(changes).for_each(|(s, c)| *s -= c);
-    }
-
     /// Puts the nodes `first` … of a tile, all in one row, at the heights `new` (units); `changes` receives what each
     /// gained. False when none did: then the tile stays untouched.
     #[inline]

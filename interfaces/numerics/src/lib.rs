@@ -9,5 +9,6 @@ struct Readme;
 
 pub mod dense;
 pub mod extremes;
+pub mod in_place;
 pub mod least_norm;
 pub mod rotation;

@@ -5,10 +5,12 @@
 //! move as one. So any joint can be cut, and the glue transmits what the link transmitted there. Shapes stay with the
 //! root's piece. Both parts start from the pose and the rates of the whole robot.
 
+use crate::joint::Joint;
 use crate::math::V3;
-use crate::model::{Body, Joint, Model};
+use crate::model::{Body, Model};
+use crate::motion::Motion;
 use crate::placement::matches;
-use crate::state::{JointState, Motion};
+use crate::state::JointState;
 use nalgebra::{Isometry3, Translation3};
 use terraglue_robot_import as import;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};

@@ -6,49 +6,10 @@
 //! gears, friction, springs and armature enter in the same way, see [`crate::actuator`]. |λ| ≤ h·max_torque whatever
 //! drives the joint: a row at its bound leaves the system and its bound acts as an external impulse.
 
-pub(crate) use crate::actuator::curve::Mode;
-use crate::actuator::curve::{Curve, Line, RATE_TOLERANCE, Tag};
+use crate::actuator::curve::{Curve, Line, Mode, Tag};
 use crate::actuator::{Item, friction, winding};
+use crate::motor::Motor;
 use crate::state::JointState;
-
-/// How the motor of a joint is driven. The numbers are the values of the variable `motor`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Motor {
-    Off,
-    Position,
-    Velocity,
-    Torque,
-    RigidPosition,
-    Voltage,
-    /// PD from the state at the start of the step, as a controller outside would compute it.
-    ExplicitPosition,
-}
-
-impl Motor {
-    pub const NAMES: [&'static str; 7] =
-        ["off", "position", "velocity", "torque", "rigid-position", "voltage", "explicit-position"];
-    const ALL: [Self; 7] = [
-        Self::Off,
-        Self::Position,
-        Self::Velocity,
-        Self::Torque,
-        Self::RigidPosition,
-        Self::Voltage,
-        Self::ExplicitPosition,
-    ];
-
-    pub fn from_index(i: i64) -> Option<Self> {
-        usize::try_from(i).ok().and_then(|i| Self::ALL.get(i).copied())
-    }
-
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().position(|n| *n == name).map(|i| Self::ALL[i])
-    }
-
-    pub fn index(self) -> i64 {
-        self as i64
-    }
-}
 
 /// At and above this, N m, a block gives way to nothing.
 pub(crate) const FULL_BLOCK: f64 = 1e12;
@@ -307,23 +268,6 @@ fn stop_rates(j: &JointState, to_lower: f64, to_upper: f64, impacts: bool) -> (f
         (to_lower, to_upper)
     }
 }
-
-/// Whether two rates count as the same.
-pub(crate) fn at_rest(u: f64) -> bool {
-    u.abs() <= RATE_TOLERANCE
-}
-
-terraglue_subsystem::persist!(
-    enum Motor {
-        Off,
-        Position,
-        Velocity,
-        Torque,
-        RigidPosition,
-        Voltage,
-        ExplicitPosition,
-    }
-);
 
 #[cfg(test)]
 mod tests {

@@ -2,9 +2,11 @@
 //! coordinates and rates of joints can be set by the names under which they are read. Bodies on joints follow theirs.
 
 use crate::dynamics::joint_rows::{place_child, rates_of_child};
+use crate::joint::Kind;
 use crate::math::{Q, V3, euler};
-use crate::model::{Kind, Model};
-use crate::state::{Motion, State};
+use crate::model::Model;
+use crate::motion::Motion;
+use crate::state::State;
 use terraglue_subsystem::{Error, Result};
 
 /// Whether the pose of a body is its own: it hangs on no joint, and no loop ties it to others.

@@ -7,8 +7,8 @@
 //! | `module`, `schema`, `objects`, `placement` | from parameters and robot files to an instance on the ground |
 //! | `cut` | one part of a robot that a scenario divides at joints |
 //! | `robot` | an instance and the calls of the interface |
-//! | `model`, `state` | what stays and what changes |
-//! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
+//! | `model`, `joint`, `state`, `motion`, `motor` | what stays and what changes |
+//! | `dynamics` | one step: its start, the whole KKT matrix with the rows of the joints, branches of the axes, trial, corrections |
 //! | `drive` | what acts along the free axis of a joint: motor, friction, limits, brake |
 //! | `closure` | what connects bodies beyond the tree: loops, rods, springs, couplings |
 //! | `actuator` | windings, gears, friction, heat, battery, energy |
@@ -29,14 +29,16 @@ mod balance;
 mod closure;
 mod contact;
 mod cut;
-mod dense;
 mod drive;
 mod dynamics;
 mod initial;
+mod joint;
 pub use terraglue_contact_solver::lcp;
 mod math;
 mod model;
 mod module;
+mod motion;
+mod motor;
 mod objects;
 mod placement;
 mod robot;

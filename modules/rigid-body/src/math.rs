@@ -58,6 +58,13 @@ pub(crate) fn unwrap_angle(angle: f64, near: f64) -> f64 {
     angle + turn * ((near - angle) / turn).round()
 }
 
+/// A right-handed frame whose tangents do not jump while the normal turns a little.
+pub(crate) fn frame_of_normal(n: V3) -> [V3; 3] {
+    let along = if n.x.abs() < 0.8 { V3::x() } else { V3::y() };
+    let t1 = (along - n * n.dot(&along)).normalize();
+    [n, t1, n.cross(&t1)]
+}
+
 #[cfg(test)]
 #[path = "../tests/unit/math.rs"]
 mod tests;

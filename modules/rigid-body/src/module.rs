@@ -1,27 +1,31 @@
 //! The module: from parameters to an instance.
 
+use crate::actuator::battery::Supply;
+use crate::actuator::curve::Mode;
 use crate::actuator::{Actuator, Item, configure};
 use crate::closure::configure::closures;
 use crate::contact::bodies::ContactLaw;
 use crate::contact::plane::Plane;
 use crate::contact::surfaces::Surfaces;
 use crate::cut;
-use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
 use crate::dynamics::scheme::{Acceleration, Integrator, Weights};
+use crate::joint::Kind;
 use crate::math::V3;
-use crate::model::{Kind, Model};
+use crate::model::Model;
+use crate::motion::Motion;
+use crate::motor::Motor;
 use crate::objects;
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
-use crate::state::{ClosureState, ContactLedger, JointState, Load, Motion, State};
+use crate::state::{ClosureState, JointState, Load, State};
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terraglue_robot_import::{
     Coupling, Drive, DriveKind, Heights, Options, Shape, ShapeGeometry, read_robot,
 };
-use terraglue_subsystem::{Config, Energy, Error, Host, LogLevel, Module, Result, Schema, Subsystem};
+use terraglue_subsystem::{Config, Error, Host, LogLevel, Module, Result, Schema, Subsystem};
 
 /// Rigid bodies with joints and motors, read from a robot file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,31 +72,8 @@ impl Module for RigidBody {
         model.closures = closures(&config, &model, (&bodies, &angles), (&file.couplings, &file.loops))?;
         file.warnings.iter().for_each(|w| host.log(LogLevel::Warning, w));
         file.notices.iter().for_each(|n| host.log(LogLevel::Info, n));
-        let mut state = State {
-            loads: vec![Load::default(); bodies.len()],
-            reactions: vec![[0.0; 6]; model.joints.len()],
-            contact_normal: vec![0.0; bodies.len()],
-            accelerations: vec![Acceleration::default(); bodies.len()],
-            accelerated: false,
-            bodies,
-            joints,
-            closures: vec![ClosureState::default(); model.closures.len()],
-            redundant_rows: 0,
-            energy: Energy::default(),
-            contact: ContactLedger::default(),
-            pressed: Vec::new(),
-            supply: configure::supply(&config)?,
-            start: None,
-            stagger: 0.0,
-        };
-        let text = format!(
-            "{}: {} bodies, {} joints, {:.6} kg",
-            file.name,
-            model.bodies.len(),
-            model.joints.len(),
-            model.mass()
-        );
-        host.log(LogLevel::Info, &text);
+        let mut state = committed(&model, bodies, joints, configure::supply(&config)?);
+        host.log(LogLevel::Info, &summary(&file.name, &model));
         let integrator = integrator(&config)?;
         let mut dynamics =
             Dynamics::new(model, integrator, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
@@ -108,6 +89,27 @@ impl Module for RigidBody {
         close_loops(&*host, &mut dynamics, &mut state)?;
         Ok(Box::new(Robot::new(host, dynamics, state)?))
     }
+}
+
+/// The state of a robot of these bodies and joints before its first step.
+fn committed(model: &Model, bodies: Vec<Motion>, joints: Vec<JointState>, supply: Supply) -> State {
+    State {
+        loads: vec![Load::default(); bodies.len()],
+        reactions: vec![[0.0; 6]; model.joints.len()],
+        contact_normal: vec![0.0; bodies.len()],
+        accelerations: vec![Acceleration::default(); bodies.len()],
+        bodies,
+        joints,
+        closures: vec![ClosureState::default(); model.closures.len()],
+        supply,
+        ..State::default()
+    }
+}
+
+/// What the log says of a robot that was read.
+fn summary(name: &str, model: &Model) -> String {
+    let (bodies, joints) = (model.bodies.len(), model.joints.len());
+    format!("{name}: {bodies} bodies, {joints} joints, {:.6} kg", model.mass())
 }
 
 /// Counts the rows that loops promise in vain, and takes from the initial rates what loops do not allow.
@@ -312,7 +314,7 @@ fn joint_states(
     rates: &[f64],
 ) -> Result<Vec<JointState>> {
     let states = model.joints.iter().zip(angles.iter().zip(rates));
-    let start = |(joint, (angle, rate)): (&crate::model::Joint, (&f64, &f64))| {
+    let start = |(joint, (angle, rate)): (&crate::joint::Joint, (&f64, &f64))| {
         Ok(JointState { velocity: *rate, ..joint_state(config, model, joint, *angle)? })
     };
     states.map(start).collect()
@@ -322,7 +324,7 @@ fn joint_states(
 fn joint_state(
     (config, said): (&Config, &Config),
     model: &Model,
-    joint: &crate::model::Joint,
+    joint: &crate::joint::Joint,
     angle: f64,
 ) -> Result<JointState> {
     let (data, joint) = (joint.data, joint.name.as_str());

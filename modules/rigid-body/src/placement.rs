@@ -2,9 +2,10 @@
 
 use crate::contact::shapes::{parry_local, parry_shape};
 use crate::dynamics::joint_rows::{place_child, rates_of_child};
+use crate::joint::Joint;
 use crate::math::V3;
-use crate::model::{Joint, Model};
-use crate::state::Motion;
+use crate::model::Model;
+use crate::motion::Motion;
 use nalgebra::{Isometry3, Translation3};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::{Ray, RayCast};

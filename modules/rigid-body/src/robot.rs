@@ -7,11 +7,12 @@ use crate::balance;
 use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::port_jacobian::PortJacobian;
 use crate::contact::ports::{Ports, committed, displacement, response, standing};
-use crate::drive::{FULL_BLOCK, Motor};
+use crate::drive::FULL_BLOCK;
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
 use crate::math::V3;
 use crate::model::Model;
+use crate::motor::Motor;
 use crate::scene;
 use crate::state::State;
 use crate::variables;
@@ -204,11 +205,11 @@ impl Robot {
             let axis = dynamics.axis_result(j);
             state.reactions[j] = dynamics.reaction(j, axis.map_or(0.0, |a| a.impulse));
             let Some(axis) = axis else { continue };
-            let mode = dynamics.modes[j];
-            let shares = dynamics.axes[j].shares(mode, axis.rate, axis.impulse);
+            let mode = dynamics.branches.modes[j];
+            let shares = dynamics.branches.axes[j].shares(mode, axis.rate, axis.impulse);
             let s = &mut state.joints[j];
             let (spring, _) = s.actuator.stored(s.angle);
-            s.angle = coordinate(joint, &dynamics.ends, s.angle);
+            s.angle = coordinate(joint, &dynamics.trial.ends, s.angle);
             s.velocity = axis.end_rate;
             s.torque = (shares.motor / h).clamp(-s.max_torque, s.max_torque);
             // A partial block that has given way holds on where it is now.
@@ -221,7 +222,7 @@ impl Robot {
                 shares,
                 rate: axis.rate,
                 mean_rate: axis.mean_rate,
-                starved: dynamics.axes[j].starved(axis.rate),
+                starved: dynamics.branches.axes[j].starved(axis.rate),
                 motor_off: s.motor == Motor::Off || s.max_torque <= 0.0,
             };
             s.actuator.commit(&outcome, supply_v, h, &mut draw);
@@ -236,9 +237,10 @@ impl Robot {
         state.supply.advance(&draw, h);
         for (b, load) in state.loads.iter().enumerate() {
             let at = dynamics.kkt.body_at[b];
-            let [mut way, mut turn] = [0, 3].map(|k| V3::from_row_slice(&dynamics.solution[at + k..][..3]));
+            let [mut way, mut turn] =
+                [0, 3].map(|k| V3::from_row_slice(&dynamics.trial.solution[at + k..][..3]));
             if !dynamics.integrator.is_second_order() {
-                let kick = dynamics.kick(b);
+                let kick = dynamics.trial.kick(b, &dynamics.kkt, &dynamics.start);
                 way -= 0.5 * V3::from_row_slice(&kick[..3]);
                 turn -= 0.5 * V3::from_row_slice(&kick[3..]);
             }
@@ -246,7 +248,7 @@ impl Robot {
         }
         // Positions of the first-order scheme are half a step ahead of its rates.
         state.stagger = if dynamics.integrator.is_second_order() { 0.0 } else { 0.5 * h };
-        state.accelerations.clone_from(&dynamics.end_accelerations);
+        state.accelerations.clone_from(&dynamics.trial.accelerations);
         state.accelerated = true;
         if state.start.is_none() {
             state.start = state.bodies.first().map(|b| b.c);
@@ -258,7 +260,7 @@ impl Robot {
         state.contact_normal.fill(0.0);
         state.contact.points = 0;
         state.contact.residual = 0.0;
-        state.contact.yielding = dynamics.yielding;
+        state.contact.yielding = dynamics.branches.yielding;
         if dynamics.integrator.is_second_order() {
             return;
         }
@@ -345,7 +347,7 @@ impl Subsystem for Robot {
         // Motors may change branch under T*; then the free motion is taken on the new branches.
         for _ in 0..4 {
             out.unique = self.solve_contact(step, partner, out)?;
-            let factor = self.dynamics.factor_count;
+            let factor = self.dynamics.kkt.factor_count;
             if self.solve_under(out.t_star, Dynamics::find_branches).is_err() {
                 // An impact that no step can follow: motors stay on the branches without it.
                 out.t_star.fill(0.0);
@@ -354,7 +356,7 @@ impl Subsystem for Robot {
                 out.unique = self.solve_contact(step, partner, out)?;
                 break;
             }
-            if self.dynamics.factor_count == factor {
+            if self.dynamics.kkt.factor_count == factor {
                 break;
             }
             self.extrapolate_free(step, out.t_star, out.x_free);
@@ -415,7 +417,7 @@ impl Subsystem for Robot {
             return Err(Error::Failed("commit without a trial of this step".into()));
         }
         if step.h == 0.0 {
-            self.state.accelerations.clone_from(&self.dynamics.start_accelerations);
+            self.state.accelerations.clone_from(&self.dynamics.start.accelerations);
             self.state.accelerated = true;
             self.changed();
             return Ok(());
@@ -426,7 +428,7 @@ impl Subsystem for Robot {
         self.book_ports(step, t);
         self.book_joints();
         self.dynamics.book_closures(&mut self.state);
-        self.state.bodies.clone_from(&self.dynamics.ends);
+        self.state.bodies.clone_from(&self.dynamics.trial.ends);
         self.changed();
         Ok(())
     }

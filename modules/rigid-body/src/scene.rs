@@ -1,9 +1,10 @@
 //! What of the robot and of the world in its files can be seen and hit, and where its bodies are.
 
 use crate::closure::{Closure, ClosureLaw};
+use crate::joint::{Joint, Kind};
 use crate::math::{Q, V3};
-use crate::model::{Body, Joint, Kind, Model};
-use crate::state::Motion;
+use crate::model::{Body, Model};
+use crate::motion::Motion;
 use crate::variables;
 use nalgebra::Isometry3;
 use terraglue_robot_import::{Heights, Shape, ShapeGeometry};

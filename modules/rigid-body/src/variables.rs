@@ -3,10 +3,11 @@
 use crate::actuator::SETTINGS;
 use crate::actuator::settings::{Group, Range};
 use crate::balance::{energy, widest_gap};
-use crate::drive::Motor;
 use crate::initial;
+use crate::joint::Kind;
 use crate::math::euler;
-use crate::model::{Kind, Model};
+use crate::model::Model;
+use crate::motor::Motor;
 use crate::state::{JointState, State};
 use terraglue_subsystem::{Action, Causality, Effect, Error, JointVariables, Result, ValueType, Variable};
 
@@ -556,26 +557,28 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
         Meaning::Joint { joint, item: item @ (ANGLE | VELOCITY) } => {
             initial::set_joint(model, state, joint, item == VELOCITY, value)
         }
-        Meaning::Joint { joint, item } => {
-            let j = &mut state.joints[joint];
-            let (slot, lowest) = match item {
-                ANGLE_TARGET => (&mut j.angle_target, f64::NEG_INFINITY),
-                VELOCITY_TARGET => (&mut j.velocity_target, f64::NEG_INFINITY),
-                TORQUE_TARGET => (&mut j.torque_target, f64::NEG_INFINITY),
-                MAX_TORQUE => (&mut j.max_torque, 0.0),
-                STIFFNESS => (&mut j.stiffness, 0.0),
-                DAMPING => (&mut j.damping, 0.0),
-                VOLTAGE_TARGET => (&mut j.actuator.voltage_target, f64::NEG_INFINITY),
-                TORQUE => return Err(Error::Refused("what the motor gave can be read only".into())),
-                _ => return Err(wrong_type(id)),
-            };
-            if value < lowest {
-                return Err(Error::Refused(format!("{value} is negative")));
-            }
-            *slot = value;
-            Ok(())
-        }
+        Meaning::Joint { joint, item } => set_motor_number(&mut state.joints[joint], item, id, value),
     }
+}
+
+/// Writes a target or a limit of a motor.
+fn set_motor_number(j: &mut JointState, item: u32, id: u32, value: f64) -> Result {
+    let (slot, lowest) = match item {
+        ANGLE_TARGET => (&mut j.angle_target, f64::NEG_INFINITY),
+        VELOCITY_TARGET => (&mut j.velocity_target, f64::NEG_INFINITY),
+        TORQUE_TARGET => (&mut j.torque_target, f64::NEG_INFINITY),
+        MAX_TORQUE => (&mut j.max_torque, 0.0),
+        STIFFNESS => (&mut j.stiffness, 0.0),
+        DAMPING => (&mut j.damping, 0.0),
+        VOLTAGE_TARGET => (&mut j.actuator.voltage_target, f64::NEG_INFINITY),
+        TORQUE => return Err(Error::Refused("what the motor gave can be read only".into())),
+        _ => return Err(wrong_type(id)),
+    };
+    if value < lowest {
+        return Err(Error::Refused(format!("{value} is negative")));
+    }
+    *slot = value;
+    Ok(())
 }
 
 /// Reads a flag.

@@ -138,7 +138,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     let profile = if no_timing { "debug" } else { "release" };
     let build: &[&str] = if no_timing { &["build"] } else { &["build", "--release"] };
     if arguments.table.is_none() {
-        must(cargo(build).args(["--package", "terraglue", "--package", "terraglue-fmu-library"]))?;
+        must(cargo(build).args(["--package", "terraglue-cli", "--package", "terraglue-fmu-library"]))?;
     }
     let part = arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone());
     let table = arguments.table.clone();
@@ -226,7 +226,7 @@ pub fn print_bits() -> Outcome {
 /// # Errors
 /// A run that fails, or a picture that cannot be written.
 pub fn write_pictures() -> Outcome {
-    must(&mut cargo(&["build", "--package", "terraglue"]))?;
+    must(&mut cargo(&["build", "--package", "terraglue-cli"]))?;
     soil::write_pictures()?;
     walk::write_picture(&program("debug"))
 }

@@ -50,7 +50,14 @@ pub fn dist(built: Option<&str>) -> Outcome {
 }
 
 fn build() -> Outcome {
-    must(&mut cargo(&["build", "--release", "--package", "terraglue", "--package", "terraglue-fmu-library"]))
+    must(&mut cargo(&[
+        "build",
+        "--release",
+        "--package",
+        "terraglue-cli",
+        "--package",
+        "terraglue-fmu-library",
+    ]))
 }
 
 /// Copies what was built in a profile and what belongs to it.

@@ -5,9 +5,9 @@ use crate::{logger, run, soil_module};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use terraglue_compare::{CompareRow, Varied};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::SearchPath;
-use terraglue_recording::compare::{self, CompareRow, Varied};
 use terraglue_scenario::{InputError, Scenario, did_you_mean, keys::STRATEGIES};
 use terraglue_subsystem::Kind;
 
@@ -261,7 +261,7 @@ fn check_folder(plans: &[Plan], folder: &Path) -> Result {
     let same = |a: &Plan, b: &Plan| a.row.soil == b.row.soil && a.row.varied == b.row.varied;
     let first = |(k, plan): &(usize, &Plan)| !plans[..*k].iter().any(|p| same(p, plan));
     let mut firsts = plans.iter().enumerate().filter(|(_, plan)| plan.refused.is_none()).filter(first);
-    firsts.try_for_each(|(_, plan)| compare::check_reference(&plan.scenario, folder))
+    firsts.try_for_each(|(_, plan)| terraglue_compare::check_reference(&plan.scenario, folder))
 }
 
 /// Wrong input shows before the first run starts; a strategy that cannot glue the scenario, or a value of `--vary` that does

@@ -1,9 +1,10 @@
 //! Calls in any order, as no coordinator makes them.
 
 use super::life_cycle::same;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Runner, Vectors};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_host::Instance;
 use terraglue_subsystem::{
@@ -12,8 +13,8 @@ use terraglue_subsystem::{
 use terraglue_terrain::SplitMix64;
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![Test {
+pub const TESTS: &[Test] = {
+    &[Test {
         name: "any-order",
         area: Area::LifeCycle,
         level: Level::Standard,
@@ -22,7 +23,7 @@ pub fn tests() -> Vec<Test> {
         promise: "calls in any order are answered by a status, and a state that was saved before stands",
         run: any_order,
     }]
-}
+};
 
 /// Calls of a round.
 const CALLS: usize = 80;

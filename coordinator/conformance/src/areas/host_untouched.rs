@@ -1,8 +1,9 @@
 //! The process of the host is the same before and after: loading and every call leave it alone.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::script;
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_host::Process;
 
@@ -15,14 +16,14 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// What is looked at before an instance takes its first step: what a changed mode does to its numbers is the same finding.
-pub fn at_loading() -> Vec<Test> {
+pub const AT_LOADING: &[Test] = {
     let promise = "loading leaves rounding, denormal numbers and traps as they were";
-    vec![Test { after: &["loads"], ..test("host-loading", promise, floating_point_loading) }]
-}
+    &[Test { after: &["loads"], ..test("host-loading", promise, floating_point_loading) }]
+};
 
 /// The other tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("host-floating-point", "rounding, denormal numbers and traps stay as they were", floating_point),
         test("host-signals", "no signal handler is set", |context| {
             untouched(context, "signal handlers", |p| p.signals.clone())
@@ -44,7 +45,7 @@ pub fn tests() -> Vec<Test> {
         }),
         test(OUTPUT, "nothing is printed: lines go through the host's log", output),
     ]
-}
+};
 
 fn untouched(context: &TestContext, what: &str, look: fn(&Process) -> String) -> Verdict {
     context.needs_a_library("it cannot touch that of the host, nothing is lost")?;

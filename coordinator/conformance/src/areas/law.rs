@@ -2,54 +2,46 @@
 //! top of these, with the law in the soil that comes with the program.
 
 use super::values::not_told;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::LawFixture;
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use std::time::Instant;
 use terraglue_host::described;
 use terraglue_subsystem::Kind;
 
-fn test(
+const fn test(
     name: &'static str,
     area: Area,
     level: Level,
+    after: &'static [&'static str],
     promise: &'static str,
     run: fn(&TestContext) -> Verdict,
 ) -> Test {
-    Test { name, area, level, kinds: &[Kind::Law], after: builds_on(name), promise, run }
+    Test { name, area, level, kinds: &[Kind::Law], after, promise, run }
 }
 
-/// What a test builds on, so that one mistake is one finding: first that a law can be called at all, then that it answers
-/// numbers, then that they are the same again, then what they mean.
-fn builds_on(name: &str) -> &'static [&'static str] {
-    match name {
-        "law-opens" => &["schema"],
-        "law-described" | "law-arrays" => &["law-opens"],
-        "law-answers" => &["law-arrays"],
-        "law-node-by-node" => &["law-same-again"],
-        "law-slope" | "law-rises" | "law-carries" => &["law-no-tension"],
-        "law-starts-at-zero" => &["law-carries"],
-        "law-shear-bound" => &["law-shear-rises"],
-        "law-friction-reached" => &["law-shear-bound"],
-        "law-state-fresh" => &["law-state-kept-apart", "law-no-tension"],
-        "law-unloads" => &["law-state-fresh"],
-        "law-cycles" => &["law-unloads", "law-rises"],
-        "law-pause" => &["law-same-again", "law-state-kept-apart"],
-        _ => &["law-answers"],
-    }
-}
-
-/// The tests of this area.
-pub fn tests() -> Vec<Test> {
+/// The tests of this area. One mistake is to be one finding: first that a law can be called at all, then that it answers numbers, then
+/// that they are the same again, then what they mean.
+pub const TESTS: &[Test] = {
     use Area::{Library, LifeCycle, Numbers, Physics, Resources, State};
     use Level::{Quick, Standard};
-    vec![
-        test("law-opens", LifeCycle, Quick, "its functions can be had with usual numbers", opens),
+    const ANSWERS: &[&str] = &["law-answers"];
+    &[
+        test(
+            "law-opens",
+            LifeCycle,
+            Quick,
+            &["schema"],
+            "its functions can be had with usual numbers",
+            opens,
+        ),
         test(
             "law-described",
             Library,
             Standard,
+            &["law-opens"],
             "its section names the functions that it has",
             described_functions,
         ),
@@ -57,6 +49,7 @@ pub fn tests() -> Vec<Test> {
             "law-arrays",
             LifeCycle,
             Quick,
+            &["law-opens"],
             "0, 1, 7 and 1000 nodes are answered, and nothing beyond them is touched",
             arrays,
         ),
@@ -64,6 +57,7 @@ pub fn tests() -> Vec<Test> {
             "law-answers",
             Numbers,
             Quick,
+            &["law-arrays"],
             "finite values and slopes over the range of depths, sizes, slips",
             answers,
         ),
@@ -71,51 +65,133 @@ pub fn tests() -> Vec<Test> {
             "law-same-again",
             Numbers,
             Quick,
+            ANSWERS,
             "the same call gives the same bytes, on any thread",
             same_again,
         ),
-        test("law-node-by-node", Numbers, Quick, "many nodes at once get what each gets alone", node_by_node),
+        test(
+            "law-node-by-node",
+            Numbers,
+            Quick,
+            &["law-same-again"],
+            "many nodes at once get what each gets alone",
+            node_by_node,
+        ),
         test(
             "law-shear-slopes",
             Numbers,
             Quick,
+            ANSWERS,
             "the slopes of the shear stress are its derivatives",
             shear_slopes,
         ),
-        test("law-no-tension", Physics, Quick, "the pressure is never negative", no_tension),
-        test("law-slope", Numbers, Quick, "the slope of the pressure is its derivative", slope),
-        test("law-rises", Physics, Quick, "the pressure does not fall with the depth", rises),
-        test("law-carries", Physics, Quick, "it carries something within the first metre", carries),
-        test("law-starts-at-zero", Physics, Quick, "the pressure fades out at the surface", starts_at_zero),
+        test("law-no-tension", Physics, Quick, ANSWERS, "the pressure is never negative", no_tension),
+        test(
+            "law-slope",
+            Numbers,
+            Quick,
+            &["law-no-tension"],
+            "the slope of the pressure is its derivative",
+            slope,
+        ),
+        test(
+            "law-rises",
+            Physics,
+            Quick,
+            &["law-no-tension"],
+            "the pressure does not fall with the depth",
+            rises,
+        ),
+        test(
+            "law-carries",
+            Physics,
+            Quick,
+            &["law-no-tension"],
+            "it carries something within the first metre",
+            carries,
+        ),
+        test(
+            "law-starts-at-zero",
+            Physics,
+            Quick,
+            &["law-carries"],
+            "the pressure fades out at the surface",
+            starts_at_zero,
+        ),
         test(
             "law-shear-rises",
             Physics,
             Quick,
+            ANSWERS,
             "the shear stress falls neither with pressure nor with slip",
             shear_rises,
         ),
-        test("law-shear-bound", Physics, Quick, "the shear stress ends at its strength", shear_bound),
+        test(
+            "law-shear-bound",
+            Physics,
+            Quick,
+            &["law-shear-rises"],
+            "the shear stress ends at its strength",
+            shear_bound,
+        ),
         test(
             "law-friction-reached",
             Physics,
             Quick,
+            &["law-shear-bound"],
             "far slipped soil reaches c + p tan(phi) where it has these numbers",
             friction_reached,
         ),
-        test("law-state-kept-apart", State, Quick, "the committed state is read, never written", state_apart),
-        test("law-state-fresh", Physics, Quick, "untouched ground has its surface at 0", state_fresh),
+        test(
+            "law-state-kept-apart",
+            State,
+            Quick,
+            ANSWERS,
+            "the committed state is read, never written",
+            state_apart,
+        ),
+        test(
+            "law-state-fresh",
+            Physics,
+            Quick,
+            &["law-state-kept-apart", "law-no-tension"],
+            "untouched ground has its surface at 0",
+            state_fresh,
+        ),
         test(
             "law-unloads",
             Physics,
             Quick,
+            &["law-state-fresh"],
             "a pressed node is unloaded where the law says that its surface is",
             unloads,
         ),
-        test("law-cycles", Physics, Quick, "no path of a node gains energy", cycles),
-        test("law-pause", Physics, Quick, "a step of no length changes nothing", pause),
-        test("law-time-per-node", Resources, Standard, "a node takes less than a microsecond", time_per_node),
+        test(
+            "law-cycles",
+            Physics,
+            Quick,
+            &["law-unloads", "law-rises"],
+            "no path of a node gains energy",
+            cycles,
+        ),
+        test(
+            "law-pause",
+            Physics,
+            Quick,
+            &["law-same-again", "law-state-kept-apart"],
+            "a step of no length changes nothing",
+            pause,
+        ),
+        test(
+            "law-time-per-node",
+            Resources,
+            Standard,
+            ANSWERS,
+            "a node takes less than a microsecond",
+            time_per_node,
+        ),
     ]
-}
+};
 
 /// Depths from a tenth of a millimetre to half a metre.
 fn depths() -> Vec<f64> {

@@ -1,7 +1,8 @@
 //! What the file is: symbols, table, description, schema.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_fmi::elf::exported_symbols;
 use terraglue_host::{LoadedModule, described, table_of};
@@ -18,8 +19,8 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("loads", &[], "the library loads with every symbol resolved, and its table can be used", loads),
         test("exports", &["loads"], "it exports the entry symbol only", exports),
         test("handshake", &["loads"], "the table states its size and versions truly", handshake),
@@ -32,7 +33,7 @@ pub fn tests() -> Vec<Test> {
         test("schema", &["loads"], "names, units, ranges and defaults of its parameters agree", schema),
         test("schema-again", &["schema"], "it describes itself the same way every time", schema_again),
     ]
-}
+};
 
 fn loads(context: &TestContext) -> Verdict {
     let module = LoadedModule::load(&context.path).map_err(|e| {

@@ -1,8 +1,9 @@
 //! Making, using, mixing up and ending instances.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, SoilFixture, script};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_host::probe_odd_calls;
 use terraglue_subsystem::{Config, Kind};
@@ -19,10 +20,10 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
+pub const TESTS: &[Test] = {
     use Level::{Quick, Standard};
     const SOIL: &[Kind] = &[Kind::Soil];
-    vec![
+    &[
         test(
             "instantiates",
             Quick,
@@ -94,7 +95,7 @@ pub fn tests() -> Vec<Test> {
             thousand,
         ),
     ]
-}
+};
 
 fn instantiates(context: &TestContext) -> Verdict {
     context.instance().map(drop)

@@ -1,11 +1,12 @@
 //! The same numbers every time, finite ones, and derivatives that are those of the answers.
 
 use super::life_cycle::same;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::derivative::{Columns, compare};
 use crate::finding::{ANSWER, Stop, Verdict};
 use crate::fixture::{BodyFixture, Foot, Runner, SoilFixture, committed, script};
 use crate::other_process::{RemoteRun, in_other_process};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_host::Workers;
 use terraglue_subsystem::{Capabilities, Kind, Level as Derivative};
@@ -22,12 +23,12 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
+pub const TESTS: &[Test] = {
     use Level::{Quick, Standard};
     const SOIL: &[Kind] = &[Kind::Soil];
     const ROBOT: &[Kind] = &[Kind::Robot];
     const BOTH: &[Kind] = &[Kind::Soil, Kind::Robot];
-    vec![
+    &[
         test("same-again", Quick, &[], &["steps"], "the same run gives the same bytes", again),
         test("same-process", Standard, &[], &["same-again"], "another process gives the same bytes", process),
         test(
@@ -96,7 +97,7 @@ pub fn tests() -> Vec<Test> {
             jacobian_robot,
         ),
     ]
-}
+};
 
 fn again(context: &TestContext) -> Verdict {
     let run = || script(context.instance()?, 90, 1).map(|(bits, _)| bits);

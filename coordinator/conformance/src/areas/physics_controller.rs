@@ -1,8 +1,9 @@
 //! What a controller obeys: it is a function of time and inputs, not of how often it is called.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{numbers, outputs, set_numbers};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_host::Instance;
 use terraglue_subsystem::{Causality, Input, Kind, Motion, Response, Step};
@@ -13,8 +14,8 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test(
             "time-not-calls",
             "half the step gives nearly the same outputs at the same times",
@@ -24,7 +25,7 @@ pub fn tests() -> Vec<Test> {
         test("bounded-power", "forces, torques and powers have declared bounds", bounded_power),
         test("reads-time", "a run that starts an hour later is answered", reads_time),
     ]
-}
+};
 
 fn step(instance: &mut Instance, t: f64, h: f64, index: u64) -> Verdict {
     let step = Step::free(t, h, index);

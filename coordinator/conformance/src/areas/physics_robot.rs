@@ -1,8 +1,9 @@
 //! What bodies obey: momentum, gravity, action and reaction, the rigid estimate.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{BodyFixture, dot};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_subsystem::{Capabilities, Kind};
 
@@ -12,8 +13,8 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("falls", "without contact, momentum grows by m g h", falls),
         test("no-gravity", "without gravity and forces, momentum stays", no_gravity),
         test("force-moves", "a force on a port changes momentum by F h", force_moves),
@@ -28,7 +29,7 @@ pub fn tests() -> Vec<Test> {
         test("estimate-apart", "T* is zero where the ground is out of reach", estimate_apart),
         test("unit-quaternions", "orientations keep their length", quaternions),
     ]
-}
+};
 
 const G: [f64; 3] = [0.0, 0.0, -9.81];
 const H: f64 = 1e-3;

@@ -1,8 +1,9 @@
 //! What every ground obeys, whatever its law: energy is not made, it pushes and never pulls, friction opposes.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
@@ -16,9 +17,9 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
+pub const TESTS: &[Test] = {
     use Level::{Quick, Standard};
-    vec![
+    &[
         test("pushes-back", Quick, "a foot that sinks is pushed up, not less when deeper", pushes_back),
         test("no-force-apart", Quick, "a foot above the ground feels nothing", no_force_apart),
         test("no-tension", Quick, "the ground never pulls a foot down", no_tension),
@@ -52,7 +53,7 @@ pub fn tests() -> Vec<Test> {
         test("moment-arm", Quick, "the pressure below a plate acts inside the plate", moment_arm),
         test("step-size", Standard, "half the step gives nearly the same forces", step_size),
     ]
-}
+};
 
 /// Work that feet did on the soil, J: trapezoids over the forces at the ends of the steps.
 struct Work {

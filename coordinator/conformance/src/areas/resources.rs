@@ -1,9 +1,10 @@
 //! Memory, threads and time.
 
 use super::life_cycle::same;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Runner, script};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use rustix::time::{ClockId, clock_gettime};
 use terraglue_host::{AllocationCounter, heap_in_use};
@@ -19,9 +20,9 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
+pub const TESTS: &[Test] = {
     use Level::{Quick, Standard};
-    vec![
+    &[
         test("no-allocation", Quick, &["steps"], "once it runs, a step allocates nothing", no_allocation),
         test("no-leak-steps", Quick, &["steps"], "memory does not grow with the number of steps", leak_steps),
         test(
@@ -46,7 +47,7 @@ pub fn tests() -> Vec<Test> {
             time_per_step,
         ),
     ]
-}
+};
 
 /// What is not known of a module in Python.
 const MEMORY: &str = "its memory is not watched";

@@ -1,9 +1,10 @@
 //! What a sensor obeys: what it shows follows from what it saw, it asks for no time to come, keeps nothing of the world, and its
 //! streams keep to what they tell.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::outputs;
+use crate::scope::{Area, Level};
 use crate::test_context::{MOUNTED, TestContext};
 use std::cell::Cell;
 use terraglue_host::{Instance, message, observe};
@@ -18,14 +19,14 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("same-view", "the same world gives the same outputs and messages, bit for bit", same_view),
         test("no-future", "nothing is asked of a time after the step", no_future),
         test("keeps-nothing", "the world is not asked outside of `observe`", keeps_nothing),
         test("honest-rates", "streams keep to their rate and their longest message", honest_rates),
     ]
-}
+};
 
 /// A sensor that takes its inputs from connections looks at nothing.
 const BLIND: &str = "it has no sight: what it shows comes from its inputs";

@@ -1,8 +1,9 @@
 //! What gluing relies on: force and motion answer each other, the estimate is respected, the ledgers are true.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Foot, SoilFixture, dot};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_subsystem::{Capabilities, Kind};
 
@@ -12,8 +13,8 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("surface-below-foot", "set_ports answers 0 along n in contact and minus the gap above", surface),
         test("force-now", "set_ports answers the force of the step before", force_now),
         test(
@@ -30,7 +31,7 @@ pub fn tests() -> Vec<Test> {
         test("no-ground-from-nothing", "pressing and dragging never raise the volume of the ground", volume),
         test("ground-follows-foot", "where a foot has been, no ground stands in its way", follows),
     ]
-}
+};
 
 fn surface(context: &TestContext) -> Verdict {
     let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0).lifted(4e-4)])?;

@@ -1,8 +1,9 @@
 //! The ledger of a soil: heat and stored energy are the work at its ports, whatever its contacts do, and heat stays heat.
 
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, SoilFixture};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_subsystem::{Energy, Kind};
 
@@ -12,12 +13,12 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("energy-balance", "heat and stored energy are the work at the ports, on three grids", balance),
         test("heat-stays", "what has become heat does not come back, on three grids", heat_stays),
     ]
-}
+};
 
 /// Distances of the nodes of the ground, m.
 const GRIDS: [f64; 3] = [0.02, 0.01, 0.005];

@@ -1,9 +1,10 @@
 //! Nothing depends on where the world's origin lies, how a frame is turned, or in which order feet come.
 
 use super::physics_soil::dragged;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
@@ -13,8 +14,8 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test("translation", "the same foot elsewhere on the same ground meets the same force", translation),
         test("height", "the same ground higher up gives the same force", height),
         test("quarter-turn", "a drag along y is a drag along x, turned", quarter_turn),
@@ -22,7 +23,7 @@ pub fn tests() -> Vec<Test> {
         test("port-frame", "tangents turned about the normal give the same force in the world", port_frame),
         test("far-feet", "feet far apart do not feel each other", far_feet),
     ]
-}
+};
 
 /// Whether two forces in the world agree to a share of the first.
 fn agree(given: &str, a: [f64; 3], b: [f64; 3], share: f64) -> Verdict {

@@ -1,10 +1,11 @@
 //! Saving, going back, trying without leaving a trace.
 
 use super::life_cycle::same;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Runner, committed};
 use crate::other_process::{RemoteRun, in_other_process};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_subsystem::Capabilities;
 
@@ -19,9 +20,9 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
+pub const TESTS: &[Test] = {
     use Level::{Quick, Standard};
-    vec![
+    &[
         test(
             "trials-invisible",
             Quick,
@@ -56,7 +57,7 @@ pub fn tests() -> Vec<Test> {
         ),
         test("poisoned-memory", Quick, &["steps"], "nothing is read that was not written first", poisoned),
     ]
-}
+};
 
 fn runner(context: &TestContext) -> Verdict<Runner> {
     Runner::new(context.instance()?)

@@ -1,9 +1,10 @@
 //! Variables and actions.
 
 use super::life_cycle::same;
-use crate::definition::{Area, Level, Test};
+use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{committed, numbers, script};
+use crate::scope::{Area, Level};
 use crate::test_context::TestContext;
 use terraglue_host::{Instance, Reply, described};
 use terraglue_plugin::describe::{variable_line, words};
@@ -19,8 +20,8 @@ const fn test(
 }
 
 /// The tests of this area.
-pub fn tests() -> Vec<Test> {
-    vec![
+pub const TESTS: &[Test] = {
+    &[
         test(
             "variables",
             &["instantiates"],
@@ -53,7 +54,7 @@ pub fn tests() -> Vec<Test> {
             unknown_action,
         ),
     ]
-}
+};
 
 fn variables(context: &TestContext) -> Verdict {
     let instance = context.instance()?;

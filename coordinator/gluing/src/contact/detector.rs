@@ -3,7 +3,8 @@
 use super::ground::{Bounds, Ground, Reader};
 use super::port_set::{PortOwner, PortSet, port_key};
 use super::shape::{Shape, pieces_of};
-use super::touching::{Found, Touching};
+use super::touching::Touching;
+use super::touching_port::Found;
 use parry3d_f64::bounding_volume::Aabb;
 use std::ops::Range;
 use terraglue_diagnostics::error::{Error, Result};

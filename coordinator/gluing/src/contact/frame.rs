@@ -2,7 +2,7 @@
 
 use super::touching::Touching;
 use terraglue_ground::{PlaneFit, Surface};
-use terraglue_subsystem::{Geometry, Node, component};
+use terraglue_subsystem::Node;
 
 /// Smallest upward part of a normal that is reckoned with; steeper ground is no height field any more.
 const STEEPEST: f64 = 0.2;
@@ -52,14 +52,6 @@ impl Patch {
         let t1 = if length > 1e-6 { across.map(|c| c / length) } else { [0.0, 1.0, 0.0] };
         let t2 = [n[1] * t1[2] - n[2] * t1[1], n[2] * t1[0] - n[0] * t1[2], n[0] * t1[1] - n[1] * t1[0]];
         [n[0], n[1], n[2], t1[0], t1[1], t1[2], t2[0], t2[1], t2[2]]
-    }
-}
-
-/// Components that a contact of this shape carries.
-pub fn mask(geometry: &Geometry) -> u32 {
-    match geometry {
-        Geometry::Sphere { .. } => component::FORCE,
-        _ => component::WRENCH,
     }
 }
 

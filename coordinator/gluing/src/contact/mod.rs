@@ -11,6 +11,7 @@ mod ground;
 mod port_set;
 mod shape;
 mod touching;
+mod touching_port;
 
 pub use detector::{BodySide, ContactDetector, GroundSide, Now};
 pub use port_set::{PortOwner, PortSet, port_key};

@@ -1,19 +1,12 @@
 //! The figures of a run at one glance.
 
 use crate::reader::Recording;
-use crate::report::html::{escape, number, with_prefix};
+use crate::report::html::{escape, number, with_prefix, without_rounding};
 use crate::summary::Summary;
 use std::fmt::Write;
 
 /// A smaller share of the energies that drifts is nothing to be told in digits.
 const SMALLEST_SHARE: f64 = 1e-5;
-/// Shorter ways and smaller angles are rounding, m or rad.
-const NOISE: f64 = 1e-6;
-
-/// The value, or 0 where it is rounding.
-pub(crate) fn heard(value: f64) -> f64 {
-    if value.abs() < NOISE { 0.0 } else { value }
-}
 
 /// One figure.
 struct Card {
@@ -64,7 +57,7 @@ fn pure(value: f64, digits: usize) -> (String, String) {
 }
 
 fn degrees(rad: f64) -> (String, String) {
-    (number(heard(rad).to_degrees(), 3), "°".into())
+    (number(without_rounding(rad).to_degrees(), 3), "°".into())
 }
 
 fn not_applicable() -> (String, String) {
@@ -106,7 +99,7 @@ fn first(s: &Summary) -> impl Iterator<Item = Card> {
 }
 
 fn distance(s: &Summary) -> Option<Card> {
-    let d = heard(s.motion.distance_m?);
+    let d = without_rounding(s.motion.distance_m?);
     let more = match s.motion.commanded_distance_m {
         Some(c) if c > 0.0 => format!("{} % of the {} m asked for", number(100.0 * d / c, 3), number(c, 4)),
         _ => "along the initial heading".into(),
@@ -171,7 +164,7 @@ fn rest(s: &Summary) -> Vec<Card> {
     if let Some(h) = s.motion.height_gained_m {
         cards.push(Card::new(
             "Height gained",
-            with_prefix(heard(h), "m", 3),
+            with_prefix(without_rounding(h), "m", 3),
             "of the reported body, against gravity",
         ));
     }
@@ -214,7 +207,7 @@ fn from_recording(r: &Recording) -> Vec<Card> {
     if let Some((_, poses)) = r.reported_body()
         && let (Some(a), Some(b)) = (poses.position.first(), poses.position.last())
     {
-        let d = heard((b[0] - a[0]).hypot(b[1] - a[1]));
+        let d = without_rounding((b[0] - a[0]).hypot(b[1] - a[1]));
         cards.push(Card::new("Displacement", (number(d, 4), "m".into()), "of the reported body, horizontal"));
     }
     let largest =

@@ -3,7 +3,7 @@
 //! sinkage look equally different.
 
 /// Colour in Oklab: lightness, green–red, blue–yellow.
-pub(crate) type Oklab = [f64; 3];
+pub type Oklab = [f64; 3];
 
 /// Undisturbed ground.
 const REST: [u8; 3] = [0xbd, 0xb8, 0xae];
@@ -31,15 +31,14 @@ pub(crate) fn to_oklab(rgb: [u8; 3]) -> Oklab {
 }
 
 /// The colours of the map, and the way from Oklab to sRGB. Made once for a picture: a pixel costs no power and no root.
-pub(crate) struct Palette {
+pub struct Palette {
     sunk: [Oklab; 5],
     heaved: [Oklab; 3],
     thresholds: [f64; 255],
 }
 
-impl Palette {
-    /// The palette.
-    pub(crate) fn new() -> Self {
+impl Default for Palette {
+    fn default() -> Self {
         let of = |k: usize, colours: &[[u8; 3]]| to_oklab(if k == 0 { REST } else { colours[k - 1] });
         Self {
             sunk: std::array::from_fn(|k| of(k, &SUNK)),
@@ -48,13 +47,15 @@ impl Palette {
             thresholds: std::array::from_fn(|k| linear((k as f64 + 0.5) / 255.0)),
         }
     }
+}
 
+impl Palette {
     fn encoded(&self, c: f64) -> u8 {
         self.thresholds.partition_point(|threshold| *threshold <= c) as u8
     }
 
     /// To sRGB, clamped to what screens show.
-    pub(crate) fn to_rgb(&self, lab: Oklab) -> [u8; 3] {
+    pub fn to_rgb(&self, lab: Oklab) -> [u8; 3] {
         let [lightness, a, b] = lab;
         let cube = |x: f64| x * x * x;
         let l = cube(lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
@@ -68,7 +69,7 @@ impl Palette {
     }
 
     /// Colour of a share of the scale: −1 most heave, 0 undisturbed, 1 deepest.
-    pub(crate) fn colour(&self, share: f64) -> Oklab {
+    pub fn colour(&self, share: f64) -> Oklab {
         let stops: &[Oklab] = if share < 0.0 { &self.heaved } else { &self.sunk };
         let place = share.abs().clamp(0.0, 1.0) * (stops.len() - 1) as f64;
         let k = (place as usize).min(stops.len() - 2);
@@ -77,7 +78,7 @@ impl Palette {
     }
 
     /// The same as `#rrggbb`.
-    pub(crate) fn hex(&self, share: f64) -> String {
+    pub fn hex(&self, share: f64) -> String {
         let [r, g, b] = self.to_rgb(self.colour(share));
         format!("#{r:02x}{g:02x}{b:02x}")
     }
@@ -89,7 +90,7 @@ mod tests {
 
     #[test]
     fn channels_are_rounded_as_srgb_says() {
-        let palette = Palette::new();
+        let palette = Palette::default();
         let srgb =
             |c: f64| if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 };
         for k in -100..=10_100 {
@@ -101,14 +102,14 @@ mod tests {
     #[test]
     fn oklab_goes_there_and_back() {
         for rgb in [[0, 0, 0], [255, 255, 255], [12, 200, 77], [255, 0, 128]] {
-            assert_eq!(Palette::new().to_rgb(to_oklab(rgb)), rgb);
+            assert_eq!(Palette::default().to_rgb(to_oklab(rgb)), rgb);
         }
         assert!((to_oklab([255; 3])[0] - 1.0).abs() < 1e-6);
     }
 
     #[test]
     fn lightness_falls_steadily_with_sinkage() {
-        let palette = Palette::new();
+        let palette = Palette::default();
         let lightness: Vec<f64> = (0..=100).map(|k| palette.colour(f64::from(k) / 100.0)[0]).collect();
         assert!(lightness.windows(2).all(|w| w[1] < w[0]));
         assert_eq!(palette.hex(0.0), "#bdb8ae");

@@ -5,10 +5,10 @@ use crate::report::html::{escape, number, with_prefix};
 use std::fmt::Write;
 
 /// Head of a line and its figure, J.
-type Line = (&'static str, fn(&Energies) -> Option<f64>);
+pub type Line = (&'static str, fn(&Energies) -> Option<f64>);
 
 /// The lines in the order in which they add up.
-pub(crate) const LINES: [Line; 6] = [
+pub const LINES: [Line; 6] = [
     ("work of motors and loads", |e| e.work_j),
     ("change of kinetic energy", |e| e.kinetic_change_j),
     ("change of potential energy", |e| e.potential_change_j),
@@ -18,7 +18,7 @@ pub(crate) const LINES: [Line; 6] = [
 ];
 
 /// A line of the card as text: the figure, or that it is unknown.
-pub(crate) fn text(value: Option<f64>) -> String {
+pub fn text(value: Option<f64>) -> String {
     value.map_or_else(
         || "unknown".into(),
         |v| {
@@ -29,7 +29,7 @@ pub(crate) fn text(value: Option<f64>) -> String {
 }
 
 /// What the drift is held against, as `0.12 % of the motors' work`; why it is unknown where it is.
-pub(crate) fn judgement(e: &Energies) -> String {
+pub fn judgement(e: &Energies) -> String {
     match (e.drift_share(), e.drift_j) {
         (Some(share), _) => format!("{}\u{2009}% {}", number(100.0 * share, 3), e.measure()),
         (None, Some(_)) => "nothing was turned over".into(),
@@ -38,7 +38,7 @@ pub(crate) fn judgement(e: &Energies) -> String {
 }
 
 /// The card of one run.
-pub(crate) fn render(e: &Energies) -> String {
+pub fn render(e: &Energies) -> String {
     let mut out = String::from(r#"<dl class="cards">"#);
     for (label, value) in LINES {
         let drift = label == "drift";
@@ -74,7 +74,7 @@ pub(crate) fn render(e: &Energies) -> String {
 }
 
 /// The cards of several runs as one table; each run with its name.
-pub(crate) fn table<'a>(runs: impl Iterator<Item = (String, &'a Energies)>) -> String {
+pub fn table<'a>(runs: impl Iterator<Item = (String, &'a Energies)>) -> String {
     let mut out =
         String::from(r#"<div class="wide"><table class="rows"><thead><tr><th class="name">run</th>"#);
     for (label, _) in LINES {

@@ -8,8 +8,10 @@ pub(crate) const MOST_POINTS: usize = 4000;
 
 /// A group of panels under one heading.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Figure {
+pub struct Figure {
+    /// Name of its section in the page.
     pub id: &'static str,
+    /// Heading.
     pub title: String,
     /// One line below the heading.
     pub note: String,
@@ -17,32 +19,39 @@ pub(crate) struct Figure {
     pub choices: Vec<String>,
     /// Chosen at first.
     pub chosen: usize,
+    /// Axes from top to bottom.
     pub panels: Vec<Panel>,
 }
 
 /// One pair of axes.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Panel {
+pub struct Panel {
     /// Name of the quantity, e.g. `normal force`.
     pub quantity: String,
     /// SI unit; empty for a pure number.
     pub unit: String,
     /// Logarithmic axis offered, and whether it is on at first.
     pub log: Option<bool>,
+    /// The choice for which it is shown; none: always.
     pub choice: Option<usize>,
     /// What stands along the axis in place of the time: quantity and unit. The times of the curves are its values then.
     pub across: Option<(&'static str, &'static str)>,
+    /// What is drawn in it.
     pub curves: Vec<Curve>,
 }
 
 /// One curve.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Curve {
+pub struct Curve {
+    /// Name in the legend.
     pub name: String,
+    /// Simulated times, s.
     pub t_s: Vec<f64>,
+    /// Values at these times, in the unit of its axes.
     pub y: Vec<f64>,
     /// Number in the page's palette.
     pub colour: usize,
+    /// Whether its line is dashed.
     pub dashed: bool,
     /// Holds its value until the next point.
     pub steps: bool,
@@ -122,7 +131,7 @@ impl Times {
 
 impl Figure {
     /// As data of the page.
-    pub fn json(&self, times: &mut Times) -> Value {
+    pub(crate) fn json(&self, times: &mut Times) -> Value {
         // What is shown on demand only may be coarser.
         let points = if self.choices.len() > 1 { MOST_POINTS / 2 } else { MOST_POINTS };
         let mut curve = |c: &Curve, over_time: bool| {

@@ -15,8 +15,10 @@ const TRACK: usize = 3;
 
 /// A body that stood on the ground at some time.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Leg {
+pub struct Leg {
+    /// Name of its subsystem.
     pub subsystem: String,
+    /// Name of the body.
     pub body: String,
     /// Sum of the normal forces of its ports at every time of `/gluing`, N.
     pub normal_n: Vec<f64>,
@@ -25,7 +27,7 @@ pub(crate) struct Leg {
 }
 
 /// All bodies that carried load, in order of their names.
-pub(crate) fn legs(recording: &Recording) -> Vec<Leg> {
+pub fn legs(recording: &Recording) -> Vec<Leg> {
     let mut legs: Vec<Leg> = Vec::new();
     for (row, record) in recording.gluing.iter().enumerate() {
         for port in &record.ports {
@@ -61,12 +63,12 @@ impl Leg {
     }
 
     /// Prints that a foot left one by one: each alone, or the few that it slid through.
-    pub fn single(&self) -> impl Iterator<Item = &Print> {
+    pub(crate) fn single(&self) -> impl Iterator<Item = &Print> {
         self.runs().filter(|run| run.len() < TRACK).flatten()
     }
 
     /// Prints of a wheel that rolled on, or of a foot that slid far, in a row.
-    pub fn tracks(&self) -> impl Iterator<Item = &[Print]> {
+    pub(crate) fn tracks(&self) -> impl Iterator<Item = &[Print]> {
         self.runs().filter(|run| run.len() >= TRACK)
     }
 
@@ -75,7 +77,7 @@ impl Leg {
     }
 
     /// Outline from above of what was below the ground when a print was deepest, m: corners of a convex line, not closed.
-    pub fn footprint(&self, recording: &Recording, print: &Print) -> Vec<[f64; 2]> {
+    pub(crate) fn footprint(&self, recording: &Recording, print: &Print) -> Vec<[f64; 2]> {
         let frame = format!("{}/{}", self.subsystem, self.body);
         let pose = recording.poses.get(&frame).and_then(|poses| {
             let k = poses

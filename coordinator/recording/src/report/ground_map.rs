@@ -136,7 +136,7 @@ fn scale_bar(low: f64, high: f64, scale: f64) -> Value {
     if scale <= 0.0 {
         return Value::Null;
     }
-    let palette = Palette::new();
+    let palette = Palette::default();
     let stops: Vec<Value> = (0..=24)
         .map(|k| {
             let share = f64::from(k) / 24.0;

@@ -1,7 +1,10 @@
 //! Small pieces of HTML: escaped text, numbers with units.
 
+/// Shorter ways and smaller angles are rounding, m or rad.
+const NOISE: f64 = 1e-6;
+
 /// Text that may stand anywhere in HTML.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -16,7 +19,7 @@ pub(crate) fn escape(text: &str) -> String {
 }
 
 /// A number with `digits` significant digits; powers of ten as such, a true minus sign.
-pub(crate) fn number(value: f64, digits: usize) -> String {
+pub fn number(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
     }
@@ -48,8 +51,13 @@ fn superscript(n: i32) -> String {
         .collect()
 }
 
+/// A way or an angle, m or rad, or 0 where it is rounding.
+pub fn without_rounding(value: f64) -> f64 {
+    if value.abs() < NOISE { 0.0 } else { value }
+}
+
 /// A number in the SI prefix that suits it: (text, unit).
-pub(crate) fn with_prefix(value: f64, unit: &str, digits: usize) -> (String, String) {
+pub fn with_prefix(value: f64, unit: &str, digits: usize) -> (String, String) {
     const PREFIXES: [(&str, f64); 8] = [
         ("M", 1e6),
         ("k", 1e3),

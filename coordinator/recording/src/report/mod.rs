@@ -1,22 +1,24 @@
 //! `report.html`: one self-contained page about a run, made from its recording.
 //!
-//! Nothing is loaded from anywhere: style, scripts, curves and the picture of the ground are inside the file.
+//! Nothing is loaded from anywhere: style, scripts, curves and the picture of the ground are inside the file. Other pages about runs
+//! are made of the same parts ([`page::Page`], [`figure::Figure`], [`energy_card`], …).
 
-pub(crate) mod cards;
-pub(crate) mod colour_map;
+mod cards;
 mod contact_owners;
-pub(crate) mod energy_card;
 mod exchange;
-pub(crate) mod figure;
 mod figures;
-pub(crate) mod footprints;
 mod ground_map;
-pub(crate) mod html;
 mod node_values;
 mod outlines;
-pub(crate) mod page;
-pub(crate) mod picture;
 mod setup;
+
+pub mod colour_map;
+pub mod energy_card;
+pub mod figure;
+pub mod footprints;
+pub mod html;
+pub mod page;
+pub mod picture;
 
 use crate::layout::{REPORT, at};
 use crate::reader::Recording;

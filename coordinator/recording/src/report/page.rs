@@ -14,7 +14,7 @@ const GROUND: &str = include_str!("../assets/ground.js");
 const MAP: &str = include_str!("../assets/map.js");
 
 /// A page under construction.
-pub(crate) struct Page {
+pub struct Page {
     title: String,
     class: &'static str,
     header: String,

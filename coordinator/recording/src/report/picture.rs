@@ -9,7 +9,7 @@ const LONGEST_SIDE: usize = 1600;
 const LIGHT: [f64; 3] = [-0.5, 0.5, std::f64::consts::FRAC_1_SQRT_2];
 
 /// Range of sinkage in a ground: (most heave ≤ 0, deepest ≥ 0), m.
-pub(crate) fn range(ground: &GroundRecord) -> (f64, f64) {
+pub fn range(ground: &GroundRecord) -> (f64, f64) {
     ground
         .sinkage
         .iter()
@@ -22,7 +22,10 @@ pub(crate) fn draw(ground: &GroundRecord, scale_m: f64) -> Result<Vec<u8>, png::
 }
 
 /// The same with no side longer than so many pixels.
-pub(crate) fn draw_within(
+///
+/// # Errors
+/// The picture has no pixel.
+pub fn draw_within(
     ground: &GroundRecord,
     scale_m: f64,
     longest: usize,
@@ -30,7 +33,7 @@ pub(crate) fn draw_within(
     let [nx, ny] = ground.size;
     let stride = nx.max(ny).div_ceil(longest).max(1);
     let (width, height) = (nx.div_ceil(stride), ny.div_ceil(stride));
-    let (relief, palette) = (Relief::new(ground, stride), Palette::new());
+    let (relief, palette) = (Relief::new(ground, stride), Palette::default());
     let mut rgb = Vec::with_capacity(width * height * 3);
     for row in (0..height).rev() {
         for column in 0..width {

@@ -1,16 +1,16 @@
 //! Clocks in event mode (FMI 3.0, 2.2.9): periodic ones tick by themselves, triggered ones when they are told to, output
 //! clocks when the FMU says so. Inputs that belong to clocks wait for a tick of one of them.
 
+use super::foreign::ForeignInstance;
 use super::functions::Api;
-use super::intervals::ToldClock;
+use super::intervals::{ToldClock, ToldClocks};
 use super::log::InstanceLog;
-use super::{FmuInstance, InstancePhase};
 use crate::description::{Causality, Ticks, Variable};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use terraglue_subsystem::ValueType;
 
 /// Sets an input when its clock ticks.
-type Held = Box<dyn Fn(&FmuInstance) -> Result + Send>;
+type Held = Box<dyn Fn(&ForeignInstance) -> Result + Send>;
 
 /// An input that belongs to clocks.
 struct Clocked {
@@ -25,7 +25,7 @@ pub struct Clocks {
     /// Input clocks that tick by themselves.
     periodic: Vec<(u32, Ticks)>,
     /// Input clocks that tick when the FMU told.
-    pub(super) told: Vec<ToldClock>,
+    pub(super) told: ToldClocks,
     /// Input clocks that tick when the next step begins.
     due: Vec<u32>,
     /// Output clocks, and whether they ticked since that was last forgotten.
@@ -36,7 +36,7 @@ pub struct Clocks {
 
 impl Clocks {
     /// The clocks that can tick. What cannot is said.
-    pub fn new(variables: &[Variable], event_mode: bool, log: &InstanceLog) -> Self {
+    pub(super) fn new(variables: &[Variable], event_mode: bool, log: &InstanceLog) -> Self {
         let clocks = || variables.iter().filter(|v| v.value_type == ValueType::Clock && !v.alias);
         if !event_mode {
             if clocks().next().is_some() {
@@ -49,9 +49,10 @@ impl Clocks {
         let input = |v: &&Variable| v.causality == Causality::Input && !v.clocks.is_empty() && !v.alias;
         let clocked =
             |v: &Variable| Clocked { reference: v.reference, clocks: v.clocks.clone(), value: None };
+        let told = |v: &Variable| Some(ToldClock::new(v.reference, v.told?, v.fraction));
         Self {
             periodic: clocks().filter_map(|v| Some((v.reference, v.ticks?))).collect(),
-            told: clocks().filter_map(|v| Some(ToldClock::new(v.reference, v.told?, v.fraction))).collect(),
+            told: ToldClocks(clocks().filter_map(told).collect()),
             due: Vec::new(),
             ticked: vec![false; outputs.len()],
             outputs,
@@ -61,135 +62,113 @@ impl Clocks {
 
     /// The first tick after t that is known, or `end`, s.
     #[inline]
-    pub fn next(&self, t: f64, end: f64) -> f64 {
+    pub(super) fn next(&self, t: f64, end: f64) -> f64 {
         let first = self.periodic.iter().map(|(_, ticks)| ticks.after(t)).fold(end, f64::min);
-        self.told.iter().map(ToldClock::next).fold(first, f64::min)
+        self.told.next(first)
     }
 
     /// Whether a clock ticks at t by itself.
     #[inline]
-    pub fn tick_at(&self, t: f64) -> bool {
-        self.periodic.iter().any(|(_, ticks)| ticks.at(t)) || self.told.iter().any(|clock| clock.is_due(t))
+    pub(super) fn tick_at(&self, t: f64) -> bool {
+        self.periodic.iter().any(|(_, ticks)| ticks.at(t)) || self.told.any_due(t)
     }
 
     /// Whether a clock ticks at t because the FMU told so just now.
     #[inline]
-    pub fn told_at(&self, t: f64) -> bool {
-        self.told.iter().any(|clock| clock.is_due(t))
+    pub(super) fn told_at(&self, t: f64) -> bool {
+        self.told.any_due(t)
     }
 
     /// Whether a triggered clock waits for the next step.
     #[inline]
-    pub fn is_due(&self) -> bool {
+    pub(super) fn is_due(&self) -> bool {
         !self.due.is_empty()
     }
-}
 
-impl FmuInstance {
     /// Makes a triggered input clock tick, or not, when the next step begins, or the initialisation ends.
-    pub fn trigger(&mut self, clock: u32, on: bool) {
-        self.clocks.due.retain(|due| *due != clock);
+    pub(super) fn trigger(&mut self, clock: u32, on: bool) {
+        self.due.retain(|due| *due != clock);
         if on {
-            self.clocks.due.push(clock);
+            self.due.push(clock);
         }
     }
 
     /// Forgets which clocks were to tick: the step that they ticked in stands.
     pub fn forget_triggers(&mut self) {
-        self.clocks.due.clear();
+        self.due.clear();
     }
 
     /// Whether a triggered input clock will tick, or an output clock has ticked since that was forgotten.
     pub fn ticks(&self, clock: u32) -> bool {
-        let out = self.clocks.outputs.iter().position(|own| *own == clock);
-        out.map_or_else(|| self.clocks.due.contains(&clock), |k| self.clocks.ticked[k])
+        let out = self.outputs.iter().position(|own| *own == clock);
+        out.map_or_else(|| self.due.contains(&clock), |k| self.ticked[k])
     }
 
     /// Forgets which output clocks have ticked.
     pub fn forget_ticks(&mut self) {
-        self.clocks.ticked.fill(false);
+        self.ticked.fill(false);
     }
 
     /// Whether an input waits for a clock.
     pub fn waits_for_clock(&self, input: u32) -> bool {
-        self.clocks.inputs.iter().any(|i| i.reference == input)
+        self.inputs.iter().any(|i| i.reference == input)
     }
 
     /// Keeps what sets an input until a clock of it ticks, then and at every tick after it.
-    pub fn hold(&mut self, input: u32, value: impl Fn(&FmuInstance) -> Result + Send + 'static) {
-        if let Some(found) = self.clocks.inputs.iter_mut().find(|i| i.reference == input) {
+    pub fn hold(&mut self, input: u32, value: impl Fn(&ForeignInstance) -> Result + Send + 'static) {
+        if let Some(found) = self.inputs.iter_mut().find(|i| i.reference == input) {
             found.value = Some(Box::new(value));
         }
     }
 
     /// In event mode: activates the clocks that the FMU told to tick at once.
-    pub(super) fn tick_told(&mut self, t: f64) -> Result {
-        self.tick_without_periodic(t, false)
+    pub(super) fn tick_told(&mut self, foreign: &ForeignInstance, t: f64) -> Result {
+        self.tick_without_periodic(foreign, t, false)
     }
 
-    fn tick_without_periodic(&mut self, t: f64, begins: bool) -> Result {
-        let periodic = std::mem::take(&mut self.clocks.periodic);
-        let ticked = self.tick(t, begins);
-        self.clocks.periodic = periodic;
+    /// The same, or at the beginning of a step those that were triggered: a periodic clock that ticks there did so when the step
+    /// before ended there.
+    pub(super) fn tick_without_periodic(
+        &mut self,
+        foreign: &ForeignInstance,
+        t: f64,
+        begins: bool,
+    ) -> Result {
+        let periodic = std::mem::take(&mut self.periodic);
+        let ticked = self.tick(foreign, t, begins);
+        self.periodic = periodic;
         ticked
     }
 
     /// In event mode: activates the input clocks that tick at t, and those that were triggered where a step begins there.
-    pub(super) fn tick(&self, t: f64, begins: bool) -> Result {
-        let Api::Three(three) = self.api else { return Ok(()) };
-        let periodic = self.clocks.periodic.iter().filter(|(_, ticks)| ticks.at(t)).map(|(vr, _)| *vr);
-        let triggered = self.clocks.due.iter().copied().filter(|_| begins);
-        let told = self.clocks.told.iter().filter(|clock| clock.take(t));
-        let due: Vec<u32> = periodic.chain(triggered).chain(told.map(|clock| clock.reference)).collect();
+    pub(super) fn tick(&self, foreign: &ForeignInstance, t: f64, begins: bool) -> Result {
+        let Api::Three(three) = foreign.api else { return Ok(()) };
+        let periodic = self.periodic.iter().filter(|(_, ticks)| ticks.at(t)).map(|(vr, _)| *vr);
+        let triggered = self.due.iter().copied().filter(|_| begins);
+        let due: Vec<u32> = periodic.chain(triggered).chain(self.told.take(t)).collect();
         if due.is_empty() {
             return Ok(());
         }
         let on = vec![true; due.len()];
         let (r, n, p) = (due.as_ptr(), due.len(), on.as_ptr());
         // SAFETY: as many values as references.
-        self.call("fmi3SetClock", three.set_clock, |f, c| unsafe { f(c, r, n, p) })?;
+        foreign.call("fmi3SetClock", three.set_clock, |f, c| unsafe { f(c, r, n, p) })?;
         let ticks = |input: &&Clocked| input.clocks.iter().any(|clock| due.contains(clock));
-        let values = self.clocks.inputs.iter().filter(ticks).filter_map(|i| i.value.as_ref());
-        values.into_iter().try_for_each(|set| set(self))
-    }
-
-    /// When a step begins: an event for the triggered clocks. Whether the FMU asks for the end.
-    pub(super) fn fire(&mut self, t: f64) -> Result<bool> {
-        let Api::Three(three) = self.api else { return Ok(false) };
-        self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
-        // a periodic clock that ticks at t did so when the step before ended there
-        self.tick_without_periodic(t, true)?;
-        let end = self.update_discrete_states(t)?;
-        self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
-        Ok(end)
+        let values = self.inputs.iter().filter(ticks).filter_map(|i| i.value.as_ref());
+        values.into_iter().try_for_each(|set| set(foreign))
     }
 
     /// In event mode, before discrete states are updated: which output clocks tick.
-    pub(super) fn look_at_clocks(&mut self) -> Result {
-        let Api::Three(three) = self.api else { return Ok(()) };
-        if self.clocks.outputs.is_empty() {
+    pub(super) fn look(&mut self, foreign: &ForeignInstance) -> Result {
+        let Api::Three(three) = foreign.api else { return Ok(()) };
+        if self.outputs.is_empty() {
             return Ok(());
         }
-        let mut on = vec![0_u8; self.clocks.outputs.len()];
-        let (r, n, p) = (self.clocks.outputs.as_ptr(), on.len(), on.as_mut_ptr());
+        let mut on = vec![0_u8; self.outputs.len()];
+        let (r, n, p) = (self.outputs.as_ptr(), on.len(), on.as_mut_ptr());
         // SAFETY: as many values as references.
-        self.call("fmi3GetClock", three.get_clock, |f, c| unsafe { f(c, r, n, p) })?;
-        self.clocks.ticked.iter_mut().zip(on).for_each(|(ticked, on)| *ticked |= on != 0);
+        foreign.call("fmi3GetClock", three.get_clock, |f, c| unsafe { f(c, r, n, p) })?;
+        self.ticked.iter_mut().zip(on).for_each(|(ticked, on)| *ticked |= on != 0);
         Ok(())
-    }
-
-    /// A trigger of what is no triggered input clock, or outside event mode.
-    ///
-    /// # Errors
-    /// [`Error::WrongInput`]: it is none, or the FMU is not in event mode.
-    pub fn can_trigger(&self, clock: &Variable) -> Result {
-        let good = clock.triggered && clock.causality == Causality::Input && self.event_mode;
-        match good && self.phase != InstancePhase::Terminated {
-            true => Ok(()),
-            false => Err(Error::WrongInput(format!(
-                "`{}` cannot be made to tick: it is no triggered input clock of an FMU in event mode",
-                clock.name
-            ))),
-        }
     }
 }

@@ -2,10 +2,10 @@
 
 use super::functions::Api;
 use super::{FmuInstance, InstancePhase};
-use crate::description::{Causality, Variable};
+use crate::description::{Causality, Dimension, ModelDescription, Variable};
 use crate::error::{Error, Result};
 use std::sync::Arc;
-use terraglue_subsystem::{ValueType, Values};
+use terraglue_subsystem::ValueType;
 
 impl FmuInstance {
     /// Sets structural parameters, by name; [`FmuInstance::description`] has the new sizes of arrays afterwards.
@@ -21,74 +21,54 @@ impl FmuInstance {
             let text = "structural parameters can only be set before the initialisation";
             return Err(Error::Refused(text.into()));
         }
-        let found = values.iter().map(|(name, value)| Ok((self.structural(name, *value)?, *value)));
+        let found =
+            values.iter().map(|(name, value)| Ok((structural(&self.description, name, *value)?, *value)));
         let found = found.collect::<Result<Vec<(Variable, i128)>>>()?;
         let sizes = |(v, value): &(Variable, i128)| Some((v.reference, u64::try_from(*value).ok()?));
         let sizes: Vec<(u32, u64)> = found.iter().filter_map(sizes).collect();
         let names: Vec<String> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
         let resized =
             self.description.resized(&sizes).map_err(|e| refused(&names.join(", "), &format!("then {e}")))?;
-        let Api::Three(three) = self.api else {
+        let Api::Three(three) = self.foreign.api else {
             return Err(Error::WrongInput("FMI 2.0 has no structural parameters".into()));
         };
         let all = names.join(", ");
-        self.call("fmi3EnterConfigurationMode", three.enter_configuration, |f, c| unsafe { f(c) })
+        self.foreign
+            .call("fmi3EnterConfigurationMode", three.enter_configuration, |f, c| unsafe { f(c) })
             .map_err(|e| named(e, &all))?;
         for ((v, value), name) in found.iter().zip(&names) {
-            self.set_whole(v, *value).map_err(|e| named(e, name))?;
+            self.foreign.set_whole(v, *value).map_err(|e| named(e, name))?;
         }
-        self.call("fmi3ExitConfigurationMode", three.exit_configuration, |f, c| unsafe { f(c) })
+        self.foreign
+            .call("fmi3ExitConfigurationMode", three.exit_configuration, |f, c| unsafe { f(c) })
             .map_err(|e| named(e, &all))?;
         self.description = Arc::new(resized);
         Ok(())
     }
+}
 
-    /// A structural parameter that may have this value.
-    fn structural(&self, name: &str, value: i128) -> Result<Variable> {
-        let found = self.description.position(name).map(|k| &self.description.variables[k]);
-        let found = found.filter(|v| v.causality == Causality::StructuralParameter);
-        let Some(v) = found else {
-            return Err(Error::WrongInput(format!("`{name}` is no structural parameter")));
-        };
-        let (low, high) = range(v.value_type).ok_or_else(|| {
-            Error::WrongInput(format!(
-                "`{name}` is a structural parameter of type {:?}; whole numbers are set",
-                v.value_type
-            ))
-        })?;
-        let sizes = self
-            .description
-            .variables
-            .iter()
-            .any(|a| a.dimensions.contains(&crate::description::Dimension::Parameter(v.reference)));
-        let low = if sizes { low.max(0) } else { low };
-        let inside = (low..=high).contains(&value) && value as f64 >= v.min && value as f64 <= v.max;
-        match inside {
-            true => Ok(v.clone()),
-            false => {
-                let (low, high) = ((low as f64).max(v.min), (high as f64).min(v.max));
-                Err(refused(&format!("{name} = {value}"), &format!("it goes from {low} to {high}")))
-            }
-        }
-    }
-
-    fn set_whole(&self, v: &Variable, value: i128) -> Result {
-        macro_rules! narrow {
-            ($variant:ident) => {{
-                let own = value.try_into().map_err(|_| Error::WrongInput("it is out of range".into()))?;
-                self.set(&[v.reference], Values::$variant(&[own]))
-            }};
-        }
-        match v.value_type {
-            ValueType::I8 => narrow!(I8),
-            ValueType::I16 => narrow!(I16),
-            ValueType::I32 => narrow!(I32),
-            ValueType::U8 => narrow!(U8),
-            ValueType::U16 => narrow!(U16),
-            ValueType::U32 => narrow!(U32),
-            ValueType::U64 => narrow!(U64),
-            ValueType::Enumeration => narrow!(Enumeration),
-            _ => narrow!(I64),
+/// A structural parameter that may have this value.
+fn structural(description: &ModelDescription, name: &str, value: i128) -> Result<Variable> {
+    let found = description.position(name).map(|k| &description.variables[k]);
+    let found = found.filter(|v| v.causality == Causality::StructuralParameter);
+    let Some(v) = found else {
+        return Err(Error::WrongInput(format!("`{name}` is no structural parameter")));
+    };
+    let (low, high) = range(v.value_type).ok_or_else(|| {
+        Error::WrongInput(format!(
+            "`{name}` is a structural parameter of type {:?}; whole numbers are set",
+            v.value_type
+        ))
+    })?;
+    let size = Dimension::Parameter(v.reference);
+    let sizes = description.variables.iter().any(|a| a.dimensions.contains(&size));
+    let low = if sizes { low.max(0) } else { low };
+    let inside = (low..=high).contains(&value) && value as f64 >= v.min && value as f64 <= v.max;
+    match inside {
+        true => Ok(v.clone()),
+        false => {
+            let (low, high) = ((low as f64).max(v.min), (high as f64).min(v.max));
+            Err(refused(&format!("{name} = {value}"), &format!("it goes from {low} to {high}")))
         }
     }
 }

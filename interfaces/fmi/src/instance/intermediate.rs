@@ -4,10 +4,10 @@
 //! An FMU calls from inside its `doStep`. What it calls at another time, from another thread, from inside another call of
 //! its own or without places for an answer is not followed and said once.
 
-use super::FmuInstance;
 use super::follow::Followed;
 use super::functions::Vr;
 use super::step_fault::StepFault;
+use crate::description::ModelDescription;
 use crate::error::{Error, Result};
 use std::ffi::{c_int, c_void};
 use std::sync::atomic::AtomicBool;
@@ -95,6 +95,40 @@ impl Updates {
         }
         Ok(inner.wrong.as_ref().filter(|_| early).map(|_| t))
     }
+
+    /// Fixes which numbers are read, once arrays have their sizes.
+    pub(super) fn watch(&self, shown: &[Vr], description: &ModelDescription) {
+        let mut inner = self.inner();
+        inner.references = shown.to_vec();
+        let variable =
+            |reference: &Vr| description.variables.iter().find(|v| v.reference == *reference && !v.alias);
+        let variables: Vec<_> = shown.iter().filter_map(variable).collect();
+        inner.count = variables.iter().map(|v| v.len()).sum();
+        inner.names = variables.iter().map(|v| v.name.clone()).collect();
+    }
+
+    /// A step begins inside which the FMU may call.
+    pub(super) fn open(&self, start: f64, end: f64, component: usize, read: Option<Read>) {
+        let thread = std::thread::current().id();
+        self.inner().window = Some(Window { thread, start, end, component, read });
+    }
+
+    /// The step has ended; why it cannot stand, if so.
+    pub(super) fn close(&self) -> Option<StepFault> {
+        let mut inner = self.inner();
+        inner.window = None;
+        inner.wrong.take()
+    }
+
+    /// Forgets the rows of a step that is made again.
+    pub(super) fn forget_rows(&self) {
+        self.inner().rows.clear();
+    }
+
+    /// Rows of intermediate times since the last step began.
+    pub(super) fn take_rows(&self) -> Vec<IntermediateRow> {
+        std::mem::take(&mut self.inner().rows)
+    }
 }
 
 impl Inner {
@@ -148,58 +182,20 @@ impl Inner {
     }
 }
 
-impl FmuInstance {
-    /// The numbers in calls of variables that are shown at intermediate times.
-    pub(super) fn shown_between(description: &crate::ModelDescription, names: &[String]) -> Result<Vec<Vr>> {
-        if !names.is_empty() && !description.capabilities.intermediate_update {
-            return Err(Error::WrongInput("the FMU does not offer intermediate update".into()));
+/// The numbers in calls of variables that are shown at intermediate times.
+pub(super) fn shown(description: &ModelDescription, names: &[String]) -> Result<Vec<Vr>> {
+    if !names.is_empty() && !description.capabilities.intermediate_update {
+        return Err(Error::WrongInput("the FMU does not offer intermediate update".into()));
+    }
+    let one = |name: &String| {
+        let v = description.position(name).map(|k| &description.variables[k]);
+        let v = v.ok_or_else(|| Error::WrongInput(format!("there is no variable `{name}`")))?;
+        match v.intermediate && v.value_type == ValueType::F64 {
+            true => Ok(v.reference),
+            false => Err(Error::WrongInput(format!(
+                "`{name}` is no Float64 with intermediateUpdate = \"true\": it cannot be read at intermediate times"
+            ))),
         }
-        let one = |name: &String| {
-            let v = description.position(name).map(|k| &description.variables[k]);
-            let v = v.ok_or_else(|| Error::WrongInput(format!("there is no variable `{name}`")))?;
-            match v.intermediate && v.value_type == ValueType::F64 {
-                true => Ok(v.reference),
-                false => Err(Error::WrongInput(format!(
-                    "`{name}` is no Float64 with intermediateUpdate = \"true\": it cannot be read at intermediate times"
-                ))),
-            }
-        };
-        names.iter().map(one).collect()
-    }
-
-    /// Fixes which numbers are read, once arrays have their sizes.
-    pub(super) fn watch_between(&self) {
-        let mut inner = self.log.updates.inner();
-        inner.references.clone_from(&self.shown);
-        let shown = |reference: &Vr| {
-            self.description.variables.iter().find(|v| v.reference == *reference && !v.alias)
-        };
-        let shown: Vec<_> = self.shown.iter().filter_map(shown).collect();
-        inner.count = shown.iter().map(|v| v.len()).sum();
-        inner.names = shown.iter().map(|v| v.name.clone()).collect();
-    }
-
-    /// A step begins inside which the FMU may call.
-    pub(super) fn open_between(&self, start: f64, end: f64, read: Option<Read>) {
-        let thread = std::thread::current().id();
-        let component = self.component as usize;
-        self.log.updates.inner().window = Some(Window { thread, start, end, component, read });
-    }
-
-    /// The step has ended; why it cannot stand, if so.
-    pub(super) fn close_between(&self) -> Option<StepFault> {
-        let mut inner = self.log.updates.inner();
-        inner.window = None;
-        inner.wrong.take()
-    }
-
-    /// Forgets the rows of a step that is made again.
-    pub(super) fn forget_between(&self) {
-        self.log.updates.inner().rows.clear();
-    }
-
-    /// Rows of intermediate times since the last step began.
-    pub fn take_intermediate(&self) -> Vec<IntermediateRow> {
-        std::mem::take(&mut self.log.updates.inner().rows)
-    }
+    };
+    names.iter().map(one).collect()
 }

@@ -5,7 +5,7 @@
 //!
 //! What was told last belongs to the state of the instance: it is saved and restored with it.
 
-use super::FmuInstance;
+use super::foreign::ForeignInstance;
 use super::functions::Api;
 use crate::description::Told;
 use crate::error::Result;
@@ -151,20 +151,46 @@ impl ToldClock {
     }
 }
 
-impl FmuInstance {
-    /// In event mode, once discrete states are settled: asks for new intervals.
-    pub(super) fn ask_intervals(&self, t: f64) -> Result {
-        if self.clocks.told.is_empty() {
-            return Ok(());
-        }
-        self.ask_decimals(t)?;
-        self.ask_fractions(t)
+/// All such clocks of an instance.
+#[derive(Default)]
+pub(super) struct ToldClocks(pub(super) Vec<ToldClock>);
+
+impl ToldClocks {
+    /// The run starts at this time, s.
+    pub fn begin(&self, start: f64) {
+        self.0.iter().for_each(|clock| clock.begin(start));
     }
 
-    fn ask_decimals(&self, t: f64) -> Result {
+    /// The first tick that is known, or `end`, s.
+    #[inline]
+    pub fn next(&self, end: f64) -> f64 {
+        self.0.iter().map(ToldClock::next).fold(end, f64::min)
+    }
+
+    /// Whether one of them ticks at t.
+    #[inline]
+    pub fn any_due(&self, t: f64) -> bool {
+        self.0.iter().any(|clock| clock.is_due(t))
+    }
+
+    /// Numbers in calls of those that tick at t; they have ticked then.
+    pub fn take(&self, t: f64) -> impl Iterator<Item = u32> {
+        self.0.iter().filter(move |clock| clock.take(t)).map(|clock| clock.reference)
+    }
+
+    /// In event mode, once discrete states are settled: asks for new intervals.
+    pub fn ask(&self, foreign: &ForeignInstance, t: f64) -> Result {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        self.ask_decimals(foreign, t)?;
+        self.ask_fractions(foreign, t)
+    }
+
+    fn ask_decimals(&self, foreign: &ForeignInstance, t: f64) -> Result {
         const NAME: &str = "fmi3GetIntervalDecimal";
-        let Api::Three(three) = self.api else { return Ok(()) };
-        let told = || self.clocks.told.iter().filter(|clock| !clock.fraction);
+        let Api::Three(three) = foreign.api else { return Ok(()) };
+        let told = || self.0.iter().filter(|clock| !clock.fraction);
         let references: Vec<u32> = told().map(|clock| clock.reference).collect();
         if references.is_empty() {
             return Ok(());
@@ -173,17 +199,17 @@ impl FmuInstance {
         let (mut intervals, mut qualifiers) = (vec![f64::NAN; n], vec![NOT_YET_KNOWN; n]);
         let (x, q) = (intervals.as_mut_ptr(), qualifiers.as_mut_ptr());
         // SAFETY: as many values as references.
-        self.call(NAME, three.get_interval, |f, c| unsafe { f(c, r, n, x, q) })?;
+        foreign.call(NAME, three.get_interval, |f, c| unsafe { f(c, r, n, x, q) })?;
         for (clock, (interval, qualifier)) in told().zip(intervals.into_iter().zip(qualifiers)) {
-            clock.tell(t, interval, qualifier).map_err(|outcome| self.lied(NAME, outcome))?;
+            clock.tell(t, interval, qualifier).map_err(|outcome| foreign.lied(NAME, outcome))?;
         }
         Ok(())
     }
 
-    fn ask_fractions(&self, t: f64) -> Result {
+    fn ask_fractions(&self, foreign: &ForeignInstance, t: f64) -> Result {
         const NAME: &str = "fmi3GetIntervalFraction";
-        let Api::Three(three) = self.api else { return Ok(()) };
-        let told = || self.clocks.told.iter().filter(|clock| clock.fraction);
+        let Api::Three(three) = foreign.api else { return Ok(()) };
+        let told = || self.0.iter().filter(|clock| clock.fraction);
         let references: Vec<u32> = told().map(|clock| clock.reference).collect();
         if references.is_empty() {
             return Ok(());
@@ -193,30 +219,30 @@ impl FmuInstance {
         let mut qualifiers = vec![NOT_YET_KNOWN; n];
         let (x, d, q) = (counters.as_mut_ptr(), resolutions.as_mut_ptr(), qualifiers.as_mut_ptr());
         // SAFETY: as many values as references.
-        self.call(NAME, three.get_fraction, |f, c| unsafe { f(c, r, n, x, d, q) })?;
+        foreign.call(NAME, three.get_fraction, |f, c| unsafe { f(c, r, n, x, d, q) })?;
         let fractions = counters.into_iter().zip(resolutions).zip(qualifiers);
         for (clock, (fraction, qualifier)) in told().zip(fractions) {
-            clock.tell_fraction(t, fraction, qualifier).map_err(|outcome| self.lied(NAME, outcome))?;
+            clock.tell_fraction(t, fraction, qualifier).map_err(|outcome| foreign.lied(NAME, outcome))?;
         }
         Ok(())
     }
 
     /// What was told last, to be kept beside a saved state.
-    pub(super) fn schedule(&self, out: &mut Vec<f64>) {
+    pub fn schedule(&self, out: &mut Vec<f64>) {
         out.clear();
-        out.extend(self.clocks.told.iter().flat_map(|clock| clock.numbers().map(Cell::get)));
+        out.extend(self.0.iter().flat_map(|clock| clock.numbers().map(Cell::get)));
     }
 
     /// Back to what was told when a state was saved.
-    pub(super) fn reschedule(&self, schedule: &[f64]) {
-        for (clock, kept) in self.clocks.told.iter().zip(schedule.chunks_exact(KEPT)) {
+    pub fn reschedule(&self, schedule: &[f64]) {
+        for (clock, kept) in self.0.iter().zip(schedule.chunks_exact(KEPT)) {
             clock.numbers().into_iter().zip(kept).for_each(|(own, kept)| own.set(*kept));
         }
     }
 
     /// Numbers of a schedule.
-    pub(super) fn schedule_len(&self) -> usize {
-        KEPT * self.clocks.told.len()
+    pub fn schedule_len(&self) -> usize {
+        KEPT * self.0.len()
     }
 }
 

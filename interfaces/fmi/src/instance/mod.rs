@@ -4,10 +4,10 @@
 //! instance that answered `error` is only freed, one that answered `fatal` is not called at all any more.
 #![allow(unsafe_code)] // Functions of foreign libraries are called.
 
-mod call;
 mod clocks;
 mod configure;
 mod follow;
+mod foreign;
 mod functions;
 mod intermediate;
 mod intervals;
@@ -18,23 +18,24 @@ mod step_fault;
 mod update_callback;
 mod values;
 
+pub use clocks::Clocks;
+pub use foreign::ForeignInstance;
 pub use intermediate::IntermediateRow;
 pub use log::{LogLine, Sink};
 pub use state::FmuState;
 pub use step::{Advance, Stepped};
 
-use crate::binary::Loaded;
-use crate::description::ModelDescription;
+use crate::description::{Causality, ModelDescription, Variable};
 use crate::error::{Error, Result};
 use crate::floating_point::Keep;
 use crate::fmu::Fmu;
-use call::{CallStatus, Health};
-use clocks::Clocks;
+use follow::Followed;
 use functions::{Api, Callbacks2, InstanceHandle};
 use log::InstanceLog;
 use std::cell::Cell;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::Arc;
+use terraglue_subsystem::{Values, ValuesMut};
 
 // SAFETY: the variadic logger of logger.c, linked with this crate.
 unsafe extern "C" {
@@ -88,20 +89,15 @@ enum InstancePhase {
     Terminated,
 }
 
-/// An instance of an FMU. What every step looks at stands first and in this order, on one line of the cache: the cost of
-/// many cheap FMUs is that of their memory.
+/// An instance of an FMU: its life from the start values to its end, and its steps. What every step looks at stands first and in
+/// this order, on one line of the cache: the cost of many cheap FMUs is that of their memory.
 #[repr(C)]
 pub struct FmuInstance {
-    component: InstanceHandle,
-    // The order matters: call-backs and log outlive the instance, the library both, the folder all.
-    log: Arc<InstanceLog>,
-    health: Cell<Health>,
     phase: InstancePhase,
     event_mode: bool,
     /// Whether the FMU may call for an intermediate update.
     updates: bool,
-    /// Begins with the functions of a step.
-    api: Api,
+    foreign: ForeignInstance,
     /// What the FMU says of itself, with the array sizes of this instance.
     description: Arc<ModelDescription>,
     clocks: Clocks,
@@ -110,15 +106,13 @@ pub struct FmuInstance {
     shown: Vec<u32>,
     /// What may be read or set in intermediate updates.
     announced: Vec<u32>,
-    warnings: Cell<u64>,
     /// Whether it was said that its clock runs ahead.
     ran_past: Cell<bool>,
     /// Whether it was said that it does not tell how far it came.
     untold: Cell<bool>,
     /// Whether it was said that it changes the floating-point mode.
     mode_told: Cell<bool>,
-    _callbacks: Option<Box<Callbacks2>>,
-    loaded: Arc<Loaded>,
+    // last: the folder outlives the library
     fmu: Arc<Fmu>,
 }
 
@@ -137,8 +131,8 @@ impl FmuInstance {
         if description.capabilities.needs_tool {
             log_needs_tool(&options.sink, description);
         }
-        let shown = Self::shown_between(description, &options.intermediate)?;
-        let mut announced = Self::followed_between(description, &options.followed)?;
+        let shown = intermediate::shown(description, &options.intermediate)?;
+        let mut announced = follow::announced(description, &options.followed)?;
         announced.extend(&shown);
         announced.sort_unstable();
         announced.dedup();
@@ -169,37 +163,27 @@ impl FmuInstance {
             let outcome = "made no instance (it returned NULL)".into();
             return Err(Error::Call { function, outcome, log: log.last(), fatal: true });
         }
+        let clocks = Clocks::new(&description.variables, event_mode, &log);
         Ok(Self {
-            api,
-            component,
-            description: description.clone(),
-            health: Cell::new(Health::Good),
             phase: InstancePhase::Instantiated,
             event_mode,
-            clocks: Clocks::new(&description.variables, event_mode, &log),
-            start: 0.0,
             updates,
+            foreign: ForeignInstance::new(component, log, api, callbacks, loaded),
+            description: description.clone(),
+            clocks,
+            start: 0.0,
             shown,
             announced,
-            warnings: Cell::new(0),
             ran_past: Cell::new(false),
             untold: Cell::new(false),
             mode_told: Cell::new(false),
-            log,
-            _callbacks: callbacks,
-            loaded,
             fmu: fmu.clone(),
         })
     }
 
-    /// The FMU.
-    pub fn fmu(&self) -> &Arc<Fmu> {
-        &self.fmu
-    }
-
     /// A warning of the host's about the FMU, among the lines that it logs.
     pub fn note(&self, text: &str) {
-        self.log.note(text);
+        self.foreign.log.note(text);
     }
 
     /// What the FMU says of itself, with the array sizes of this instance.
@@ -208,15 +192,82 @@ impl FmuInstance {
         &self.description
     }
 
-    /// Calls that ended with a warning.
-    pub fn warnings(&self) -> u64 {
-        self.warnings.get()
+    /// The instance on the other side, for calls that need no more than its variables.
+    #[inline]
+    pub fn foreign(&self) -> &ForeignInstance {
+        &self.foreign
     }
 
-    /// Whether nothing of the instance may be called any more.
-    #[inline]
-    pub fn is_dead(&self) -> bool {
-        self.health.get() == Health::Dead
+    /// [`ForeignInstance::get_f64`].
+    #[allow(clippy::missing_errors_doc)]
+    #[inline(always)]
+    pub fn get_f64(&self, references: &[u32], out: &mut [f64]) -> Result {
+        self.foreign.get_f64(references, out)
+    }
+
+    /// [`ForeignInstance::set_f64`].
+    #[allow(clippy::missing_errors_doc)]
+    #[inline(always)]
+    pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
+        self.foreign.set_f64(references, values)
+    }
+
+    /// [`ForeignInstance::get`].
+    #[allow(clippy::missing_errors_doc)]
+    pub fn get(&self, references: &[u32], out: ValuesMut) -> Result {
+        self.foreign.get(references, out)
+    }
+
+    /// [`ForeignInstance::set`].
+    #[allow(clippy::missing_errors_doc)]
+    pub fn set(&self, references: &[u32], values: Values) -> Result {
+        self.foreign.set(references, values)
+    }
+
+    /// Its clocks.
+    pub fn clocks(&self) -> &Clocks {
+        &self.clocks
+    }
+
+    /// Its clocks, to be changed.
+    pub fn clocks_mut(&mut self) -> &mut Clocks {
+        &mut self.clocks
+    }
+
+    /// Makes a triggered input clock tick, or not, when the next step begins, or the initialisation ends.
+    ///
+    /// # Errors
+    /// [`Error::WrongInput`]: it is no such clock, or the FMU is not in event mode.
+    pub fn trigger(&mut self, clock: &Variable, on: bool) -> Result {
+        let good = clock.triggered && clock.causality == Causality::Input && self.event_mode;
+        if !good || self.phase == InstancePhase::Terminated {
+            return Err(Error::WrongInput(format!(
+                "`{}` cannot be made to tick: it is no triggered input clock of an FMU in event mode",
+                clock.name
+            )));
+        }
+        self.clocks.trigger(clock.reference, on);
+        Ok(())
+    }
+
+    /// Tells what an input is at any time inside a step (FMI 3): `at` writes its elements at a time, s, and leaves NaN where
+    /// there is no number. The FMU asks for it in its intermediate update, if it does; where a step has parts – an event,
+    /// a clock, an early return – it is set between them too.
+    ///
+    /// # Errors
+    /// An input that was not announced ([`InstanceOptions::followed`]).
+    pub fn follow(&mut self, input: &Variable, at: impl Fn(f64, &mut [f64]) + Send + 'static) -> Result {
+        let followed = Followed::new(&self.foreign.api, input, at)?;
+        if !self.announced.contains(&input.reference) {
+            return Err(Error::Refused(format!("`{}` was not announced as an input to follow", input.name)));
+        }
+        self.foreign.log.updates.inner().followed.push(followed);
+        Ok(())
+    }
+
+    /// Rows of intermediate times since the last step began.
+    pub fn take_intermediate(&self) -> Vec<IntermediateRow> {
+        self.foreign.log.updates.take_rows()
     }
 
     /// Enters initialisation mode, after start values were set.
@@ -227,22 +278,28 @@ impl FmuInstance {
         let _mode = Keep::new();
         self.start = start;
         if self.updates {
-            self.watch_between();
+            self.foreign.log.updates.watch(&self.shown, &self.description);
         }
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
-        match self.api {
+        match self.foreign.api {
             Api::Two(two) => {
                 let (tolerant, stops) = (c_int::from(has_tolerance), c_int::from(has_stop));
-                self.call("fmi2SetupExperiment", two.setup, |f, c| unsafe {
+                self.foreign.call("fmi2SetupExperiment", two.setup, |f, c| unsafe {
                     f(c, tolerant, tolerance, start, stops, stop)
                 })?;
-                self.call("fmi2EnterInitializationMode", two.enter_initialization, |f, c| unsafe { f(c) })?;
+                self.foreign.call(
+                    "fmi2EnterInitializationMode",
+                    two.enter_initialization,
+                    |f, c| unsafe { f(c) },
+                )?;
             }
             Api::Three(three) => {
-                self.call("fmi3EnterInitializationMode", three.enter_initialization, |f, c| unsafe {
-                    f(c, has_tolerance, tolerance, start, has_stop, stop)
-                })?;
+                self.foreign.call(
+                    "fmi3EnterInitializationMode",
+                    three.enter_initialization,
+                    |f, c| unsafe { f(c, has_tolerance, tolerance, start, has_stop, stop) },
+                )?;
             }
         }
         self.phase = InstancePhase::Initializing;
@@ -255,18 +312,23 @@ impl FmuInstance {
     /// [`Error::Call`]: the FMU failed.
     pub fn exit_initialization(&mut self) -> Result {
         let _mode = Keep::new();
-        match self.api {
+        match self.foreign.api {
             Api::Two(two) => {
-                self.call("fmi2ExitInitializationMode", two.exit_initialization, |f, c| unsafe { f(c) })?;
+                self.foreign
+                    .call("fmi2ExitInitializationMode", two.exit_initialization, |f, c| unsafe { f(c) })?;
             }
             Api::Three(three) => {
-                self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
+                self.foreign.call(
+                    "fmi3ExitInitializationMode",
+                    three.exit_initialization,
+                    |f, c| unsafe { f(c) },
+                )?;
                 if self.event_mode {
-                    self.clocks.told.iter().for_each(|clock| clock.begin(self.start));
-                    self.tick(self.start, true)?;
-                    self.forget_triggers();
+                    self.clocks.told.begin(self.start);
+                    self.clocks.tick(&self.foreign, self.start, true)?;
+                    self.clocks.forget_triggers();
                     self.update_discrete_states(self.start)?;
-                    self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+                    self.foreign.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
                 }
             }
         }
@@ -277,19 +339,13 @@ impl FmuInstance {
     /// Whether every function may be called that its phase allows.
     #[inline]
     pub fn is_good(&self) -> bool {
-        self.health.get() == Health::Good
+        self.foreign.is_good()
     }
 
     /// Whether the initialisation has not begun: values can be set, not read.
     #[inline]
     pub fn is_instantiated(&self) -> bool {
         self.phase == InstancePhase::Instantiated
-    }
-
-    /// Whether it is in initialisation mode.
-    #[inline]
-    pub fn is_initializing(&self) -> bool {
-        self.phase == InstancePhase::Initializing
     }
 
     /// Ends the simulation; values can still be read.
@@ -302,9 +358,9 @@ impl FmuInstance {
         }
         self.phase = InstancePhase::Terminated;
         let _mode = Keep::new();
-        match self.api {
-            Api::Two(two) => self.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
-            Api::Three(three) => self.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
+        match self.foreign.api {
+            Api::Two(two) => self.foreign.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
+            Api::Three(three) => self.foreign.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
         }
     }
 
@@ -313,42 +369,26 @@ impl FmuInstance {
     /// # Errors
     /// [`Error::Call`]: the FMU failed.
     pub fn reset(&mut self) -> Result {
-        match self.api {
-            Api::Two(two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
-            Api::Three(three) => self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?,
+        match self.foreign.api {
+            Api::Two(two) => self.foreign.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
+            Api::Three(three) => {
+                self.foreign.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?
+            }
         }
         self.phase = InstancePhase::Instantiated;
-        self.forget_followed();
+        self.foreign.log.updates.inner().followed.clear();
         self.description = self.fmu.description().clone();
-        self.clocks = Clocks::new(&self.description.variables, self.event_mode, &self.log);
-        self.health.set(Health::Good);
+        self.clocks = Clocks::new(&self.description.variables, self.event_mode, &self.foreign.log);
+        self.foreign.recover();
         Ok(())
     }
 }
 
 impl Drop for FmuInstance {
     fn drop(&mut self) {
-        let _mode = Keep::new();
-        if self.health.get() == Health::Dead {
-            // Nothing of it may be called, so what it still holds must stay loaded.
-            std::mem::forget(self.loaded.clone());
-            return;
-        }
-        if self.health.get() == Health::Good {
+        if self.foreign.is_good() {
             // The run is over; what it says to this is in its log.
             drop(self.terminate());
-        }
-        if self.health.get() == Health::Dead {
-            std::mem::forget(self.loaded.clone());
-            return;
-        }
-        let free = match &self.api {
-            Api::Two(two) => two.free,
-            Api::Three(three) => three.free,
-        };
-        if let Some(free) = free {
-            // SAFETY: a live instance, freed once.
-            unsafe { free(self.component) };
         }
     }
 }
@@ -440,10 +480,4 @@ fn file_uri(path: &str) -> String {
         }
     }
     uri
-}
-
-/// Whether a status lets the caller go on.
-#[inline]
-pub(crate) fn goes_on(status: CallStatus) -> bool {
-    matches!(status, CallStatus::Ok | CallStatus::Warning)
 }

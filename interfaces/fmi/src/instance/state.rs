@@ -31,23 +31,26 @@ impl FmuState {
     }
 }
 
-impl FmuInstance {
-    fn can(&self, what: bool, name: &str) -> Result {
-        if what { Ok(()) } else { Err(Error::Refused(format!("the FMU does not offer {name}"))) }
-    }
+/// Refuses what the FMU does not offer.
+fn offered(what: bool, name: &str) -> Result {
+    if what { Ok(()) } else { Err(Error::Refused(format!("the FMU does not offer {name}"))) }
+}
 
+impl FmuInstance {
     /// Saves the state; the memory of an earlier one in `state` is used again.
     ///
     /// # Errors
     /// [`Error::Refused`] where the FMU cannot; it is unharmed then and goes on.
     pub fn save(&self, state: &mut FmuState) -> Result {
-        self.can(self.description.capabilities.state, "to save its state")?;
+        offered(self.description.capabilities.state, "to save its state")?;
         let place = &raw mut state.handle;
         // SAFETY: `state` is null or a state of this instance, here and below.
-        match self.api {
-            Api::Two(two) => self.call("fmi2GetFMUstate", two.get_state, |f, c| unsafe { f(c, place) })?,
+        match self.foreign.api {
+            Api::Two(two) => {
+                self.foreign.call("fmi2GetFMUstate", two.get_state, |f, c| unsafe { f(c, place) })?
+            }
             Api::Three(three) => {
-                self.call("fmi3GetFMUState", three.get_state, |f, c| unsafe { f(c, place) })?;
+                self.foreign.call("fmi3GetFMUState", three.get_state, |f, c| unsafe { f(c, place) })?;
             }
         }
         if state.handle.is_null() {
@@ -56,7 +59,7 @@ impl FmuInstance {
                     .into(),
             ));
         }
-        self.schedule(&mut state.schedule);
+        self.clocks.told.schedule(&mut state.schedule);
         Ok(())
     }
 
@@ -68,14 +71,15 @@ impl FmuInstance {
         if state.is_empty() {
             return Err(Error::Refused("no state was saved".into()));
         }
-        self.reschedule(&state.schedule);
+        self.clocks.told.reschedule(&state.schedule);
         let state = state.handle;
-        match self.api {
+        match self.foreign.api {
             Api::Two(two) => {
-                self.call_after_error("fmi2SetFMUstate", two.set_state, |f, c| unsafe { f(c, state) })
+                self.foreign.call_after_error("fmi2SetFMUstate", two.set_state, |f, c| unsafe { f(c, state) })
             }
             Api::Three(three) => {
-                self.call_after_error("fmi3SetFMUState", three.set_state, |f, c| unsafe { f(c, state) })
+                self.foreign
+                    .call_after_error("fmi3SetFMUState", three.set_state, |f, c| unsafe { f(c, state) })
             }
         }
     }
@@ -85,16 +89,18 @@ impl FmuInstance {
     /// # Errors
     /// [`Error::Call`]: the FMU failed.
     pub fn release(&self, state: &mut FmuState) -> Result {
-        if state.is_empty() || self.is_dead() {
+        if state.is_empty() || self.foreign.is_dead() {
             return Ok(());
         }
         let place = &raw mut state.handle;
-        let done = match self.api {
+        let done = match self.foreign.api {
             Api::Two(two) => {
-                self.call_after_error("fmi2FreeFMUstate", two.free_state, |f, c| unsafe { f(c, place) })
+                self.foreign
+                    .call_after_error("fmi2FreeFMUstate", two.free_state, |f, c| unsafe { f(c, place) })
             }
             Api::Three(three) => {
-                self.call_after_error("fmi3FreeFMUState", three.free_state, |f, c| unsafe { f(c, place) })
+                self.foreign
+                    .call_after_error("fmi3FreeFMUState", three.free_state, |f, c| unsafe { f(c, place) })
             }
         };
         state.handle = std::ptr::null_mut();
@@ -106,32 +112,36 @@ impl FmuInstance {
     /// # Errors
     /// [`Error::Refused`]: the FMU cannot. [`Error::Call`]: it failed.
     pub fn serialize(&self, state: &FmuState) -> Result<Vec<u8>> {
-        self.can(self.description.capabilities.serialize, "to serialise its state")?;
+        offered(self.description.capabilities.serialize, "to serialise its state")?;
         let (state, schedule) = (state.handle, &state.schedule);
         let mut size = 0_usize;
         let place = &raw mut size;
-        match self.api {
+        match self.foreign.api {
             Api::Two(two) => {
-                self.call("fmi2SerializedFMUstateSize", two.state_size, |f, c| unsafe { f(c, state, place) })?
+                self.foreign.call("fmi2SerializedFMUstateSize", two.state_size, |f, c| unsafe {
+                    f(c, state, place)
+                })?
             }
             Api::Three(three) => {
-                self.call("fmi3SerializedFMUStateSize", three.state_size, |f, c| unsafe {
+                self.foreign.call("fmi3SerializedFMUStateSize", three.state_size, |f, c| unsafe {
                     f(c, state, place)
                 })?
             }
         }
         if size > LARGEST_STATE {
             let text = format!("says that its state has {size} bytes");
-            return Err(self.lied("SerializedFMUStateSize", text));
+            return Err(self.foreign.lied("SerializedFMUStateSize", text));
         }
         let mut bytes = vec![0_u8; size];
         let out = bytes.as_mut_ptr();
-        match self.api {
-            Api::Two(two) => self.call("fmi2SerializeFMUstate", two.serialize, |f, c| unsafe {
+        match self.foreign.api {
+            Api::Two(two) => self.foreign.call("fmi2SerializeFMUstate", two.serialize, |f, c| unsafe {
                 f(c, state, out.cast(), size)
             })?,
             Api::Three(three) => {
-                self.call("fmi3SerializeFMUState", three.serialize, |f, c| unsafe { f(c, state, out, size) })?
+                self.foreign.call("fmi3SerializeFMUState", three.serialize, |f, c| unsafe {
+                    f(c, state, out, size)
+                })?
             }
         }
         // what belongs to the state but lies with the master goes behind it
@@ -144,20 +154,23 @@ impl FmuInstance {
     /// # Errors
     /// [`Error::Refused`]: the FMU cannot, or the bytes are too few. [`Error::Call`]: it failed.
     pub fn deserialize(&self, bytes: &[u8], state: &mut FmuState) -> Result {
-        self.can(self.description.capabilities.serialize, "to serialise its state")?;
-        let schedule = 8 * self.schedule_len();
+        offered(self.description.capabilities.serialize, "to serialise its state")?;
+        let schedule = 8 * self.clocks.told.schedule_len();
         let Some((bytes, schedule)) = bytes.len().checked_sub(schedule).map(|n| bytes.split_at(n)) else {
             return Err(Error::Refused("the bytes of a state are too few for the clocks of the FMU".into()));
         };
         let number = |b: &[u8]| b.try_into().map_or(f64::INFINITY, f64::from_le_bytes);
         state.schedule = schedule.chunks_exact(8).map(number).collect();
         let (place, data, n) = (&raw mut state.handle, bytes.as_ptr(), bytes.len());
-        match self.api {
-            Api::Two(two) => self.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
+        match self.foreign.api {
+            Api::Two(two) => self.foreign.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
                 f(c, data.cast(), n, place)
             }),
-            Api::Three(three) => self
-                .call("fmi3DeserializeFMUState", three.deserialize, |f, c| unsafe { f(c, data, n, place) }),
+            Api::Three(three) => {
+                self.foreign.call("fmi3DeserializeFMUState", three.deserialize, |f, c| unsafe {
+                    f(c, data, n, place)
+                })
+            }
         }
     }
 
@@ -188,15 +201,17 @@ impl FmuInstance {
             }
             return Ok(());
         }
-        self.can(c.directional_derivatives, "directional derivatives")?;
+        offered(c.directional_derivatives, "directional derivatives")?;
         let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
         let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
-        match self.api {
-            Api::Two(two) => self.call("fmi2GetDirectionalDerivative", two.directional, |f, c| unsafe {
-                f(c, z, n_z, v, n_v, s, o)
-            }),
+        match self.foreign.api {
+            Api::Two(two) => {
+                self.foreign.call("fmi2GetDirectionalDerivative", two.directional, |f, c| unsafe {
+                    f(c, z, n_z, v, n_v, s, o)
+                })
+            }
             Api::Three(three) => {
-                self.call("fmi3GetDirectionalDerivative", three.directional, |f, c| unsafe {
+                self.foreign.call("fmi3GetDirectionalDerivative", three.directional, |f, c| unsafe {
                     f(c, z, n_z, v, n_v, s, n_s, o, n_o)
                 })
             }
@@ -214,14 +229,14 @@ impl FmuInstance {
         seed: &[f64],
         out: &mut [f64],
     ) -> Result {
-        self.can(self.description.capabilities.adjoint_derivatives, "adjoint derivatives")?;
-        let Api::Three(three) = self.api else {
+        offered(self.description.capabilities.adjoint_derivatives, "adjoint derivatives")?;
+        let Api::Three(three) = self.foreign.api else {
             return Err(Error::Refused("FMI 2.0 has no adjoint derivatives".into()));
         };
         let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
         let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
         // SAFETY: so many references and values.
-        self.call("fmi3GetAdjointDerivative", three.adjoint, |f, c| unsafe {
+        self.foreign.call("fmi3GetAdjointDerivative", three.adjoint, |f, c| unsafe {
             f(c, z, n_z, v, n_v, s, n_s, o, n_o)
         })
     }

@@ -1,8 +1,8 @@
 //! `doStep`, events between steps, and what both answer.
 
-use super::call::CallStatus;
+use super::foreign::{CallStatus, goes_on};
 use super::functions::{Api, Three};
-use super::{FmuInstance, InstancePhase, goes_on};
+use super::{FmuInstance, InstancePhase};
 use crate::error::{Error, Result};
 use crate::floating_point::Mode;
 use std::ffi::c_int;
@@ -70,11 +70,12 @@ impl FmuInstance {
         if self.phase != InstancePhase::Stepping {
             return Err(too_soon());
         }
-        let Api::Two(two) = &self.api else { return self.do_step_3(step) };
+        let Api::Two(two) = &self.foreign.api else { return self.do_step_3(step) };
         let for_good = c_int::from(step.for_good);
         let mode = Mode::now();
         // SAFETY: the arguments are those of the standard.
-        let status = self.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) });
+        let status =
+            self.foreign.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) });
         if mode.restore() {
             mode_changed(self, DO_STEP_2);
         }
@@ -90,15 +91,15 @@ impl FmuInstance {
     #[cold]
     fn stopped_2(&self, step: Advance, status: CallStatus) -> Result<Stepped> {
         const NAME: &str = DO_STEP_2;
-        let Api::Two(two) = self.api else { return Err(Error::Refused(NAME.into())) };
+        let Api::Two(two) = self.foreign.api else { return Err(Error::Refused(NAME.into())) };
         let end = step.t + step.h;
         if status != CallStatus::Discard {
-            return Err(self.failed(NAME, status));
+            return Err(self.foreign.failed(NAME, status));
         }
-        let log = self.log.last();
+        let log = self.foreign.log.last();
         let mut reached = f64::NAN;
         // SAFETY: the arguments are those of the standard, here and below.
-        let answer = self.status("fmi2GetRealStatus", two.get_real_status, |f, c| unsafe {
+        let answer = self.foreign.status("fmi2GetRealStatus", two.get_real_status, |f, c| unsafe {
             f(c, LAST_SUCCESSFUL_TIME, &raw mut reached)
         });
         let reached = match answer {
@@ -106,7 +107,7 @@ impl FmuInstance {
             _ => step.t,
         };
         let mut terminated = 0;
-        let answer = self.status("fmi2GetBooleanStatus", two.get_boolean_status, |f, c| unsafe {
+        let answer = self.foreign.status("fmi2GetBooleanStatus", two.get_boolean_status, |f, c| unsafe {
             f(c, TERMINATED, &raw mut terminated)
         });
         if answer.is_ok_and(goes_on) && terminated != 0 {
@@ -120,7 +121,7 @@ impl FmuInstance {
         let end = step.t + step.h;
         let (mut t, mut events, mut returns) = (step.t, 0, 0);
         if self.updates {
-            self.forget_between();
+            self.foreign.log.updates.forget_rows();
         }
         let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
         if self.clocks.is_due() {
@@ -150,11 +151,11 @@ impl FmuInstance {
             }
             if !(at_stop || event && self.event_mode) && last <= t {
                 let outcome = format!("came no further than t = {last} s in the step to {end} s");
-                return Err(self.lied(DO_STEP_3, outcome));
+                return Err(self.foreign.lied(DO_STEP_3, outcome));
             }
             returns += u32::from(!at_stop);
             if let Some(outcome) = endless(events, returns) {
-                return Err(self.lied(DO_STEP_3, outcome));
+                return Err(self.foreign.lied(DO_STEP_3, outcome));
             }
             t = now;
             if self.updates && !settles {
@@ -167,33 +168,33 @@ impl FmuInstance {
     #[inline]
     fn do_part(&mut self, step: Advance, (t, stop): (f64, f64), tolerance: f64) -> Result<StepPart> {
         const NAME: &str = DO_STEP_3;
-        let Api::Three(Three { do_step, get_f64, .. }) = self.api else {
+        let Api::Three(Three { do_step, get_f64, .. }) = self.foreign.api else {
             return Err(Error::Refused(NAME.into()));
         };
         let (mut event, mut terminate, mut early, mut last) = (false, false, false, UNTOLD);
         // a step that is repeated goes back to where its first part began
         let for_good = step.for_good && (t <= step.t || !self.description.capabilities.state);
         if self.updates {
-            self.open_between(t, stop, get_f64);
+            self.foreign.log.updates.open(t, stop, self.foreign.address(), get_f64);
         }
         let mode = Mode::now();
-        let status = self.status(NAME, do_step, |f, c| unsafe {
+        let status = self.foreign.status(NAME, do_step, |f, c| unsafe {
             f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
         });
         if mode.restore() {
             mode_changed(self, NAME);
         }
-        let wrong = if self.updates { self.close_between() } else { None };
+        let wrong = if self.updates { self.foreign.log.updates.close() } else { None };
         let status = status?;
         if status == CallStatus::Discard && !wrong.as_ref().is_some_and(|w| w.fatal) {
             let reached = if last >= step.t && last <= step.t + step.h { last } else { step.t };
-            return Err(Error::Discard { function: NAME, reached, log: self.log.last() });
+            return Err(Error::Discard { function: NAME, reached, log: self.foreign.log.last() });
         }
         if let Some(wrong) = wrong {
-            return Err(self.stopped_between(NAME, wrong, status));
+            return Err(self.foreign.stopped_between(NAME, wrong, status));
         }
         if !goes_on(status) {
-            return Err(self.failed(NAME, status));
+            return Err(self.foreign.failed(NAME, status));
         }
         if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
             last = untold(self, stop);
@@ -205,38 +206,59 @@ impl FmuInstance {
         let at_stop = past || (last - stop).abs() <= tolerance;
         if !at_stop && !early || last.is_nan() || last < t - tolerance || last > stop + tolerance && !past {
             let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
-            return Err(self.lied(NAME, outcome));
+            return Err(self.foreign.lied(NAME, outcome));
         }
         Ok(StepPart { event, terminate, last, at_stop })
     }
 
     /// Event mode at `now`, with the clocks that tick there at the end of a part; whether the FMU asks for the end.
     fn handle_event(&mut self, now: f64, at_stop: bool) -> Result<bool> {
-        let Api::Three(Three { enter_event_mode, enter_step_mode, .. }) = self.api else { return Ok(false) };
-        self.call("fmi3EnterEventMode", enter_event_mode, |f, c| unsafe { f(c) })?;
+        let Api::Three(Three { enter_event_mode, enter_step_mode, .. }) = self.foreign.api else {
+            return Ok(false);
+        };
+        self.foreign.call("fmi3EnterEventMode", enter_event_mode, |f, c| unsafe { f(c) })?;
         if self.updates {
             self.set_followed(now)?;
         }
         if at_stop {
-            self.tick(now, false)?;
+            self.clocks.tick(&self.foreign, now, false)?;
         }
         if self.update_discrete_states(now)? {
             return Ok(true);
         }
-        self.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
+        self.foreign.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
         Ok(false)
+    }
+
+    /// When a step begins: an event for the triggered clocks. Whether the FMU asks for the end.
+    fn fire(&mut self, t: f64) -> Result<bool> {
+        let Api::Three(three) = self.foreign.api else { return Ok(false) };
+        self.foreign.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
+        self.clocks.tick_without_periodic(&self.foreign, t, true)?;
+        let end = self.update_discrete_states(t)?;
+        self.foreign.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+        Ok(end)
+    }
+
+    /// Between two parts of a step: sets the inputs that the FMU follows; what it asked for last may be of another time.
+    fn set_followed(&self, t: f64) -> Result {
+        let mut inner = self.foreign.log.updates.inner();
+        inner.followed.iter_mut().try_for_each(|input| {
+            let (reference, values) = input.values_at(t)?;
+            self.foreign.set(&[reference], values)
+        })
     }
 
     /// Updates discrete states at t until nothing changes and no clock ticks; whether the FMU asks for the end.
     pub(super) fn update_discrete_states(&mut self, t: f64) -> Result<bool> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
-        let Api::Three(three) = self.api else { return Ok(false) };
+        let Api::Three(three) = self.foreign.api else { return Ok(false) };
         for _ in 0..ROUNDS {
             let (mut again, mut terminate, mut nominals, mut values, mut defined) =
                 (false, false, false, false, false);
             let mut next = f64::INFINITY;
-            self.look_at_clocks()?;
-            self.call(NAME, three.update_discrete, |f, c| unsafe {
+            self.clocks.look(&self.foreign)?;
+            self.foreign.call(NAME, three.update_discrete, |f, c| unsafe {
                 f(
                     c,
                     &raw mut again,
@@ -251,14 +273,14 @@ impl FmuInstance {
                 return Ok(true);
             }
             if !again {
-                self.ask_intervals(t)?;
+                self.clocks.told.ask(&self.foreign, t)?;
                 if !self.clocks.told_at(t) {
                     return Ok(false);
                 }
-                self.tick_told(t)?;
+                self.clocks.tick_told(&self.foreign, t)?;
             }
         }
-        Err(self.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))
+        Err(self.foreign.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))
     }
 }
 
@@ -274,7 +296,7 @@ fn endless(events: u32, returns: u32) -> Option<String> {
 #[cold]
 fn mode_changed(instance: &FmuInstance, function: &str) {
     if !instance.mode_told.replace(true) {
-        instance.log.note(&format!(
+        instance.foreign.log.note(&format!(
             "{function} changed how this thread rounds or treats tiny numbers; it is set back after each step"
         ));
     }
@@ -285,7 +307,7 @@ fn mode_changed(instance: &FmuInstance, function: &str) {
 fn runs_ahead(instance: &FmuInstance, last: f64, stop: f64) {
     if !instance.ran_past.replace(true) {
         let text = format!("says that it came to t = {last} s in a step to {stop} s; taken as {stop} s");
-        instance.log.note(&text);
+        instance.foreign.log.note(&text);
     }
 }
 
@@ -293,7 +315,7 @@ fn runs_ahead(instance: &FmuInstance, last: f64, stop: f64) {
 #[cold]
 fn untold(instance: &FmuInstance, stop: f64) -> f64 {
     if !instance.untold.replace(true) {
-        instance.log.note("fmi3DoStep does not say how far it came (lastSuccessfulTime), which breaks the standard; its steps count as made");
+        instance.foreign.log.note("fmi3DoStep does not say how far it came (lastSuccessfulTime), which breaks the standard; its steps count as made");
     }
     stop
 }

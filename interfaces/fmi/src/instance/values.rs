@@ -1,10 +1,11 @@
 //! Values of variables, in the types of both versions.
 
-use super::FmuInstance;
+use super::foreign::ForeignInstance;
 use super::functions::Api;
+use crate::description::Variable;
 use crate::error::{Error, Result};
 use std::ffi::{CStr, CString, c_char};
-use terraglue_subsystem::{Values, ValuesMut};
+use terraglue_subsystem::{ValueType, Values, ValuesMut};
 
 macro_rules! plain {
     ($self:ident, $name:literal, $f:expr, $references:ident, $values:ident . $pointer:ident) => {{
@@ -15,7 +16,7 @@ macro_rules! plain {
     }};
 }
 
-impl FmuInstance {
+impl ForeignInstance {
     /// Values of f64 variables.
     ///
     /// # Errors
@@ -234,6 +235,49 @@ impl FmuInstance {
                 // SAFETY: so many references and values.
                 self.call("fmi3SetBinary", three.set_binary, |f, c| unsafe { f(c, r, n, s, p, m) })
             }
+        }
+    }
+
+    /// Slopes of inputs over the coming step, in their units per s (FMI 2.0); values are set before.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: FMI 3.0, or not as many slopes as references. [`Error::Call`]: the FMU refuses them.
+    pub fn set_slopes(&self, references: &[u32], slopes: &[f64]) -> Result {
+        const NAME: &str = "fmi2SetRealInputDerivatives";
+        let Api::Two(two) = &self.api else {
+            return Err(Error::Refused("FMI 3.0 takes no derivatives of inputs".into()));
+        };
+        if references.len() != slopes.len() {
+            let (n, m) = (references.len(), slopes.len());
+            return Err(Error::Refused(format!("{n} references but {m} slopes")));
+        }
+        let orders = vec![1; references.len()];
+        let (r, n, o, p) = (references.as_ptr(), references.len(), orders.as_ptr(), slopes.as_ptr());
+        // SAFETY: as many orders and values as references.
+        self.call(NAME, two.set_slopes, |f, c| unsafe { f(c, r, n, o, p) })
+    }
+
+    /// A whole number into a variable of any type that holds some.
+    ///
+    /// # Errors
+    /// [`Error::WrongInput`]: out of the range of the type. [`Error::Call`]: the FMU refuses it.
+    pub(super) fn set_whole(&self, v: &Variable, value: i128) -> Result {
+        macro_rules! narrow {
+            ($variant:ident) => {{
+                let own = value.try_into().map_err(|_| Error::WrongInput("it is out of range".into()))?;
+                self.set(&[v.reference], Values::$variant(&[own]))
+            }};
+        }
+        match v.value_type {
+            ValueType::I8 => narrow!(I8),
+            ValueType::I16 => narrow!(I16),
+            ValueType::I32 => narrow!(I32),
+            ValueType::U8 => narrow!(U8),
+            ValueType::U16 => narrow!(U16),
+            ValueType::U32 => narrow!(U32),
+            ValueType::U64 => narrow!(U64),
+            ValueType::Enumeration => narrow!(Enumeration),
+            _ => narrow!(I64),
         }
     }
 

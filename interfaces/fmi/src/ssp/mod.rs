@@ -4,9 +4,11 @@
 //! files (`.ssd`). None of the code of its FMUs runs. What this reader does not know it refuses by name, such as
 //! packages inside packages.
 
+mod context;
 mod model;
 mod parameters;
 mod structure;
+mod transformation;
 
 pub use model::*;
 

@@ -1,6 +1,7 @@
 //! Reads parameter bindings with their sets (`.ssv`) and mappings (`.ssm`), inside the structure or in files of their own.
 
-use super::structure::{Context, transformation};
+use super::context::Context;
+use super::transformation::transformation;
 use super::{Binding, MappingEntry, Parameter, Value};
 use crate::description::element::{Element, Reader};
 use crate::description::{parse, types};

@@ -1,35 +1,17 @@
 //! Reads `SystemStructure.ssd`.
 
+use super::context::Context;
+use super::transformation::transformation;
 use super::{
     Component, Connection, Connector, Dictionary, DictionaryReference, End, Files, Structure, System,
-    SystemElement, Table, Transformation, Value, parameters,
+    SystemElement, parameters,
 };
 use crate::description::element::{Element, Reader};
 use crate::description::{parse, types};
 use crate::error::Result;
-use terraglue_subsystem::unit::Unit;
 
 /// Deepest nesting of systems, those in files of their own counted.
 const DEPTH: usize = 50;
-
-/// Where something is read.
-#[derive(Clone, Copy)]
-pub struct Context<'a> {
-    /// Files that may be named.
-    pub files: &'a Files<'a>,
-    /// Units that the structure defines.
-    pub units: &'a [(String, Unit)],
-    /// Systems around it.
-    depth: usize,
-}
-
-impl Context<'_> {
-    /// What the name of a unit means: by `own` definitions, by those of the structure, or else in our reading.
-    pub fn unit(&self, name: &str, own: &[(String, Unit)]) -> Option<Unit> {
-        let defined = own.iter().chain(self.units).find(|(n, _)| n == name).map(|(_, unit)| *unit);
-        defined.or_else(|| Unit::parse(name).ok().filter(|_| !name.is_empty()))
-    }
-}
 
 /// Reads a description; `file` names it in errors.
 pub fn read(files: &Files, bytes: &[u8], file: &'static str) -> Result<Structure> {
@@ -194,58 +176,4 @@ fn connection(element: &Element) -> Result<Connection> {
         end: end("endElement", "endConnector")?,
         transformation: transformation(element)?,
     })
-}
-
-/// The transformation inside a connection or an entry of a mapping.
-pub fn transformation(element: &Element) -> Result<Transformation> {
-    let mut found =
-        Transformation { keeps_unit: element.flag("suppressUnitConversion")?, ..Transformation::default() };
-    for inner in element.children() {
-        match inner.name() {
-            "LinearTransformation" => {
-                found.factor = inner.optional_number("factor")?.unwrap_or(1.0);
-                found.offset = inner.optional_number("offset")?.unwrap_or(0.0);
-                if !(found.factor.is_finite() && found.offset.is_finite()) {
-                    return Err(inner.error("factor and offset must be finite"));
-                }
-            }
-            "BooleanMappingTransformation" => {
-                found.table =
-                    Some(table(&inner, |e, key| e.required(key).and(e.flag(key)).map(Value::Boolean))?);
-            }
-            "IntegerMappingTransformation" => {
-                let whole = |e: &Element, key: &str| {
-                    e.required(key)?;
-                    let number = e.whole(key, "a whole number")?;
-                    number.map(Value::Integer).ok_or_else(|| e.error(format!("lacks the attribute `{key}`")))
-                };
-                found.table = Some(table(&inner, whole)?);
-            }
-            "EnumerationMappingTransformation" => {
-                let text = |e: &Element, key: &str| Ok(Value::Text(e.required(key)?.to_owned()));
-                found.table = Some(table(&inner, text)?);
-            }
-            name if name.ends_with("Transformation") => {
-                return Err(inner.error("this transformation is not read here"));
-            }
-            _ => {}
-        }
-    }
-    Ok(found)
-}
-
-/// The entries of a table, each value once.
-fn table(element: &Element, value: impl Fn(&Element, &str) -> Result<Value>) -> Result<Table> {
-    let mut found = Table::default();
-    for entry in element.children().filter(|e| e.name() == "MapEntry") {
-        let (source, target) = (value(&entry, "source")?, value(&entry, "target")?);
-        if found.of(&source).is_some() {
-            return Err(entry.error(format!("the value {} occurs twice", entry.text("source"))));
-        }
-        found.0.push((source, target));
-    }
-    match found.0.is_empty() {
-        true => Err(element.error("has no <MapEntry>")),
-        false => Ok(found),
-    }
 }

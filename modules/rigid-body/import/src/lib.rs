@@ -20,6 +20,7 @@ mod mjcf;
 mod model;
 mod plausible;
 mod pose;
+mod repair;
 mod shapes;
 mod solid;
 mod syntax;

@@ -3,10 +3,11 @@
 use crate::Options;
 use crate::check::{inertial, isometry, mass_spread, not_positive};
 use crate::error::{Error, Source};
-use crate::inertia::{Inertial, repair};
+use crate::inertia::Inertial;
 use crate::merge::{Merged, merge};
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
 use crate::plausible;
+use crate::repair::repair;
 use crate::shapes::Shapes;
 use crate::tree::{LinkPlace, order};
 use crate::unread;
@@ -41,35 +42,10 @@ fn build(
     if world {
         check_world(source, robot, merged, options.fixed_base)?;
     }
-    let shift = usize::from(world);
-    let (mut bodies, mut joints) = (Vec::new(), Vec::new());
-    for group in shift..merged.chief.len() {
-        let (first, above) = merged.first[group];
-        let name = &robot.links[merged.chief[group].unwrap_or(first)].name;
-        let Some(Inertial { mass, com, tensor: inertia }) = merged.together(group, inertials) else {
-            let problem =
-                "moves on a joint but has no mass; give it an <inertial>, or make a joint next to it fixed";
-            return Err(source.link(name, problem));
-        };
-        if mass <= 0.0 {
-            return Err(source.link(name, not_positive(mass)));
-        }
-        if let Some(j) = above {
-            joints.push(joint(source, robot, merged, j, first, bodies.len(), shift)?);
-        }
-        bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
-    }
+    let (mut bodies, joints) = bodies_and_joints(source, robot, inertials, merged)?;
     let folders = options.folders(source.file);
-    let (mut shapes, mut world_shapes) = (Shapes::new(source, &folders), Vec::new());
-    for place in order {
-        let (frame, body) = (merged.body_from_link(place.link), merged.group[place.link].checked_sub(shift));
-        let found = shapes.of(&robot.links[place.link], body.is_none())?;
-        let moved = found.into_iter().map(|s| Shape { body_from_shape: frame * s.body_from_shape, ..s });
-        match body {
-            Some(body) => bodies[body].shapes.extend(moved),
-            None => world_shapes.extend(moved),
-        }
-    }
+    let mut shapes = Shapes::new(source, &folders);
+    let world_shapes = give_shapes(robot, order, merged, &mut shapes, &mut bodies)?;
     let base = match merged.chief[0] {
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
@@ -103,6 +79,56 @@ fn build(
         warnings,
         notices,
     })
+}
+
+/// The bodies that are left of the links, without shapes, and the joints between them.
+fn bodies_and_joints(
+    source: &Source,
+    robot: &urdf_rs::Robot,
+    inertials: &[Option<Inertial>],
+    merged: &Merged,
+) -> Result<(Vec<Body>, Vec<Joint>), Error> {
+    let shift = usize::from(merged.chief[0].is_none());
+    let (mut bodies, mut joints) = (Vec::new(), Vec::new());
+    for group in shift..merged.chief.len() {
+        let (first, above) = merged.first[group];
+        let name = &robot.links[merged.chief[group].unwrap_or(first)].name;
+        let Some(Inertial { mass, com, tensor: inertia }) = merged.together(group, inertials) else {
+            let problem =
+                "moves on a joint but has no mass; give it an <inertial>, or make a joint next to it fixed";
+            return Err(source.link(name, problem));
+        };
+        if mass <= 0.0 {
+            return Err(source.link(name, not_positive(mass)));
+        }
+        if let Some(j) = above {
+            joints.push(joint(source, robot, merged, j, first, bodies.len(), shift)?);
+        }
+        bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
+    }
+    Ok((bodies, joints))
+}
+
+/// Gives the bodies the shapes of their links; what stands still in the world is left.
+fn give_shapes(
+    robot: &urdf_rs::Robot,
+    order: &[LinkPlace],
+    merged: &Merged,
+    shapes: &mut Shapes,
+    bodies: &mut [Body],
+) -> Result<Vec<Shape>, Error> {
+    let shift = usize::from(merged.chief[0].is_none());
+    let mut still = Vec::new();
+    for place in order {
+        let (frame, body) = (merged.body_from_link(place.link), merged.group[place.link].checked_sub(shift));
+        let found = shapes.of(&robot.links[place.link], body.is_none())?;
+        let moved = found.into_iter().map(|s| Shape { body_from_shape: frame * s.body_from_shape, ..s });
+        match body {
+            Some(body) => bodies[body].shapes.extend(moved),
+            None => still.extend(moved),
+        }
+    }
+    Ok(still)
 }
 
 /// Pairs of bodies with fixed joints only between them, or one joint that moves besides: their shapes overlap where they are joined,

@@ -17,14 +17,16 @@
 struct Readme;
 
 mod dense;
+mod forest;
 mod loops;
 mod path;
 mod rows;
 mod spatial;
 mod tree;
 
+pub use forest::{Error, Link};
 pub use loops::{Cut, MOST_PARTS};
 pub use path::Path;
 pub use rows::Rows;
 pub use spatial::Wrench;
-pub use tree::{Error, Link, Tree};
+pub use tree::Tree;

@@ -7,9 +7,8 @@
 //! mechanism has 30 rows for 30 coordinates, and moves).
 
 use crate::dense::Dense;
-use crate::path::shared_entries;
+use crate::forest::{Error, Forest};
 use crate::spatial::{Wrench, dot};
-use crate::tree::{Error, Tree};
 /// A row that moves less than this share of what it would move with its bodies free moves nothing but rounding.
 const IMMOBILE: f64 = 1e-20;
 /// Bodies that one row can act on.
@@ -64,15 +63,15 @@ impl Loops {
     }
 
     /// Factorises against the trees, which have been factored.
-    pub fn factor(&mut self, tree: &Tree, cuts: &[Cut]) -> Result<(), Error> {
+    pub fn factor(&mut self, forest: &Forest, cuts: &[Cut]) -> Result<(), Error> {
         self.cuts.copy_from_slice(cuts);
-        self.answer(tree);
-        self.fill(tree);
+        self.answer(forest);
+        self.fill(forest);
         if !self.w.factor() {
             return Err(Error::Loops);
         }
         self.live = self.cuts.iter().filter(|c| c.compliance.is_some()).count();
-        let n = tree.tree_len();
+        let n = forest.len();
         self.columns.clear();
         self.columns.resize(n * self.cuts.len(), 0.0);
         for (cut, column) in self.cuts.iter().zip(self.columns.chunks_exact_mut(n)) {
@@ -80,15 +79,15 @@ impl Loops {
                 for (body, wrench) in cut.parts.iter().flatten() {
                     column[6 * body..6 * body + 6].iter_mut().zip(wrench).for_each(|(c, w)| *c += w);
                 }
-                tree.substitute_trees(column);
+                forest.substitute(column);
             }
         }
         Ok(())
     }
 
-    fn answer(&mut self, tree: &Tree) {
+    fn answer(&mut self, forest: &Forest) {
         let touched = self.cuts.iter().flat_map(|c| c.parts).flatten();
-        self.stride = touched.map(|(b, _)| tree.path_len(b)).max().unwrap_or(0);
+        self.stride = touched.map(|(b, _)| forest.path_len(b)).max().unwrap_or(0);
         self.answers.clear();
         self.answers.resize(self.cuts.len() * MOST_PARTS * self.stride, 0.0);
         for (i, cut) in self.cuts.iter().enumerate().filter(|(_, c)| c.compliance.is_some()) {
@@ -96,7 +95,7 @@ impl Loops {
                 cut.parts.iter().enumerate().filter_map(|(p, x)| Some((p, x.as_ref()?)))
             {
                 let at = (i * MOST_PARTS + p) * self.stride;
-                tree.climb(*body, wrench, &mut self.answers[at..at + self.stride]);
+                forest.climb(*body, wrench, &mut self.answers[at..at + self.stride]);
             }
         }
     }
@@ -111,38 +110,38 @@ impl Loops {
     }
 
     /// W, scaled to a unit diagonal.
-    fn fill(&mut self, tree: &Tree) {
+    fn fill(&mut self, forest: &Forest) {
         let n = self.cuts.len();
         for i in 0..n {
-            let own = self.entry(tree, i, i) + self.cuts[i].compliance.unwrap_or(0.0);
-            let moves = own > IMMOBILE * self.free_mobility(i, tree) || own.is_nan();
+            let own = self.entry(forest, i, i) + self.cuts[i].compliance.unwrap_or(0.0);
+            let moves = own > IMMOBILE * self.free_mobility(i, forest) || own.is_nan();
             self.scale[i] = if moves { 1.0 / own.sqrt() } else { 0.0 };
             self.w.set(i, i, if moves { self.scale[i] * self.scale[i] * own } else { 0.0 });
             for k in 0..i {
-                let value = self.scale[i] * self.scale[k] * self.entry(tree, i, k);
+                let value = self.scale[i] * self.scale[k] * self.entry(forest, i, k);
                 self.w.set(i, k, value);
             }
         }
     }
 
     /// About what a unit impulse along row i would move if its bodies were free.
-    fn free_mobility(&self, i: usize, tree: &Tree) -> f64 {
+    fn free_mobility(&self, i: usize, forest: &Forest) -> f64 {
         let part = |(body, w): &(usize, Wrench)| {
             let (force, moment) = w.split_at(3);
             let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
-            let (mass, inertia) = tree.own_inertia(*body);
+            let (mass, inertia) = forest.own_inertia(*body);
             size(force) / mass + size(moment) / inertia
         };
         self.cuts[i].parts.iter().flatten().map(part).sum()
     }
 
     /// Entry of H·K⁻¹·Hᵀ.
-    fn entry(&self, tree: &Tree, i: usize, k: usize) -> f64 {
+    fn entry(&self, forest: &Forest, i: usize, k: usize) -> f64 {
         if self.cuts[i].compliance.is_none() || self.cuts[k].compliance.is_none() {
             return 0.0;
         }
         let pairs = self.parts(i).flat_map(|a| self.parts(k).map(move |b| (a, b)));
-        pairs.map(|((a, x), (b, y))| sum(shared_entries(tree, a, b), x, y)).sum()
+        pairs.map(|((a, x), (b, y))| sum(forest.shared(a, b), x, y)).sum()
     }
 
     /// Adds what the rows do to a solution of the trees; `x[n..]` holds their right-hand sides and then impulses.
@@ -164,9 +163,9 @@ impl Loops {
     }
 
     /// What the rows feel of a body's answer, as vector z with z_a·z_b to be taken from y_a·y_b.
-    pub fn feel(&self, tree: &Tree, body: usize, y: &[f64], z: &mut [f64]) {
+    pub fn feel(&self, forest: &Forest, body: usize, y: &[f64], z: &mut [f64]) {
         for i in 0..self.cuts.len() {
-            let felt = |(b, x): (usize, &[f64])| sum(shared_entries(tree, body, b), x, y);
+            let felt = |(b, x): (usize, &[f64])| sum(forest.shared(body, b), x, y);
             z[i] = if self.cuts[i].compliance.is_some() {
                 self.scale[i] * self.parts(i).map(felt).sum::<f64>()
             } else {

@@ -13,19 +13,19 @@ pub struct Path;
 impl Path {
     /// Number of entries for a body.
     pub fn len(tree: &Tree, body: usize) -> usize {
-        tree.loops().len() + tree.path_len(body)
+        tree.loops().len() + tree.forest().path_len(body)
     }
 
     /// How many entries the vectors of two bodies have in common; 0: nothing connects them.
     pub fn shared(tree: &Tree, a: usize, b: usize) -> usize {
-        tree.loops().len() + shared_entries(tree, a, b)
+        tree.loops().len() + tree.forest().shared(a, b)
     }
 
     /// Writes y of a wrench on a body (about its centre of mass, world axes) into `y[..Path::len(body)]`.
     pub fn respond(tree: &Tree, body: usize, wrench: &Wrench, y: &mut [f64]) {
         let (loops, path) = y.split_at_mut(tree.loops().len());
-        tree.climb(body, wrench, path);
-        tree.loops().feel(tree, body, path, loops);
+        tree.forest().climb(body, wrench, path);
+        tree.loops().feel(tree.forest(), body, path, loops);
     }
 
     /// ⟨y_a, y_b⟩ over the shared entries: what loops hold back counts against.
@@ -34,17 +34,4 @@ impl Path {
         let held: f64 = a[..loops].iter().zip(&b[..loops]).map(|(a, b)| a * b).sum();
         a[loops..shared].iter().zip(&b[loops..shared]).map(|(a, b)| a * b).sum::<f64>() - held
     }
-}
-
-/// Freedoms that the paths of two bodies have in common.
-pub(crate) fn shared_entries(tree: &Tree, mut a: usize, mut b: usize) -> usize {
-    // Parents come first, so the later body is never the ancestor.
-    while a != b {
-        let later = if a > b { &mut a } else { &mut b };
-        match tree.above(*later) {
-            Some(above) => *later = above,
-            None => return 0,
-        }
-    }
-    tree.path_len(a)
 }

@@ -6,8 +6,9 @@
 //! the scheme, of first order in h, and counts as heat.
 
 use super::battery::Draw;
+use super::curve::at_rest;
 use super::{Actuator, Drivetrain, Item, friction, thermal, winding};
-use crate::drive::{Shares, at_rest};
+use crate::drive::Shares;
 
 /// Powers of the last step (W) and energies since the start (J).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -6,9 +6,9 @@
 //! the current limit allow. The gear loses (1 − η)·power in either direction: τ = η_driving·N·τ_m where the motor
 //! drives the joint, τ = N·τ_m/η_driven where the joint drives the motor; at rest anything between the two.
 
-use super::curve::{Curve, Line, Tag};
+use super::curve::{Curve, Line, Tag, at_rest};
 use super::{Actuator, Drivetrain, Item};
-use crate::drive::{Motor, at_rest};
+use crate::motor::Motor;
 use crate::state::JointState;
 
 /// Temperature at which the resistance is given, K.

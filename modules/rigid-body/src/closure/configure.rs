@@ -1,9 +1,10 @@
 //! Connections from the scenario: `[[robot.loop]]`, `[[robot.spring]]`, `[[robot.coupling]]`.
 
 use super::{Closure, ClosureLaw, Points, Spring};
+use crate::joint::{Joint, Kind};
 use crate::math::{Q, V3, frame_along};
-use crate::model::{Joint, Kind, Model};
-use crate::state::Motion;
+use crate::model::Model;
+use crate::motion::Motion;
 use serde_json::{Map, Value};
 use terraglue_robot_import as import;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};

@@ -9,9 +9,9 @@
 pub(crate) mod configure;
 
 use crate::dynamics::joint_rows::{coordinate, gap, mean_rows, rows};
+use crate::joint::Joint;
 use crate::math::V3;
-use crate::model::Joint;
-use crate::state::Motion;
+use crate::motion::Motion;
 use terraglue_linear_solver::{Cut, MOST_PARTS, Rows};
 
 /// A connection.

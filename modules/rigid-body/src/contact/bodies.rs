@@ -9,12 +9,12 @@ use crate::contact::detection::{ContactPoint, Detector};
 use crate::contact::memory::{Pressed, recall, remember};
 use crate::contact::plane::Plane;
 use crate::contact::surfaces::Surfaces;
-use crate::dense::{cholesky, cholesky_solve};
 use crate::model::Model;
-use crate::state::Motion;
+use crate::motion::Motion;
 use terraglue_contact_solver::lcp::{Facets, Method, Outcome, Pyramid};
 use terraglue_contact_solver::{Options, Problem, Solver};
 use terraglue_linear_solver::{Path, Tree};
+use terraglue_numerics::in_place::{cholesky, cholesky_solve};
 use terraglue_subsystem::{Config, Error};
 
 /// Overlap up to which it is taken out within one step, m.

@@ -7,12 +7,15 @@
 use crate::math::V3;
 use nalgebra::{Isometry3, Point3};
 use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::query::details::NormalConstraints;
+use parry3d_f64::query::details::{NormalConstraints, distance_support_map_support_map};
 use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d_f64::shape::{Shape, ShapeType};
 
 /// Hulls overlap by this much along the face that separates them best, m.
 const OVERLAP: f64 = 1e-3;
+
+/// To which GJK is trusted, m.
+const ACCURACY: f64 = 1e-6;
 
 pub(crate) type Manifold = ContactManifold<(), ()>;
 
@@ -36,6 +39,9 @@ pub(crate) fn between_convex(
     manifold.points.clear();
     manifold.local_n1 = Vector::ZERO;
     let push = if is_hull(a) && has_corners(b) || is_hull(b) && has_corners(a) {
+        if are_apart(a, b, relative, reach) {
+            return;
+        }
         let (normal, apart) = best_face(a, b, relative);
         if apart > reach {
             return;
@@ -55,6 +61,13 @@ pub(crate) fn between_convex(
     }
     let taken = push.dot(&vector(manifold.local_n1));
     manifold.points.iter_mut().for_each(|p| p.dist += taken);
+}
+
+/// Whether GJK finds two shapes farther from each other than `reach`, m: most pairs that are near are, and the faces of hulls, each held
+/// against all corners of the other, need not be looked at then.
+fn are_apart(a: &dyn Shape, b: &dyn Shape, relative: &Isometry3<f64>, reach: f64) -> bool {
+    let (Some(a), Some(b)) = (a.as_support_map(), b.as_support_map()) else { return false };
+    distance_support_map_support_map(&Pose::from(*relative), a, b) > reach + ACCURACY
 }
 
 fn is_hull(shape: &dyn Shape) -> bool {

@@ -8,9 +8,9 @@ use crate::contact::plane::{Plane, support_points};
 use crate::contact::reduce::{Found, reduce};
 use crate::contact::shapes::{parry_local, parry_shape};
 use crate::contact::triangles::{is_ground, on_triangles};
-use crate::math::{Q, V3};
+use crate::math::{Q, V3, frame_of_normal};
 use crate::model::Model;
-use crate::state::Motion;
+use crate::motion::Motion;
 use nalgebra::{Isometry3, Point3, Translation3};
 use parry3d_f64::math::Pose;
 use parry3d_f64::query;
@@ -73,13 +73,6 @@ pub(crate) struct Detector {
 struct PairScratch {
     manifold: Manifold,
     found: Vec<Found>,
-}
-
-/// A right-handed frame whose tangents do not jump while the normal turns a little.
-pub(crate) fn frame(n: V3) -> [V3; 3] {
-    let along = if n.x.abs() < 0.8 { V3::x() } else { V3::y() };
-    let t1 = (along - n * n.dot(&along)).normalize();
-    [n, t1, n.cross(&t1)]
 }
 
 /// Points for which room is made beforehand at most.
@@ -225,7 +218,7 @@ fn on_ground(
         reduce(found);
     }
     out.extend(found.iter().map(|f| {
-        let (bodies, frame) = ([None, c.body], frame(f.normal));
+        let (bodies, frame) = ([None, c.body], frame_of_normal(f.normal));
         ContactPoint { pair, bodies, frame, points: [f.on_ground, f.on_shape], gap: f.gap, friction }
     }));
 }
@@ -251,7 +244,7 @@ fn between(
         on_triangles((&*b.shape, &pose_b), (&*a.shape, &pose_a), reach, manifold, &mut |f| found.push(f));
         reduce(found);
         out.extend(found.iter().map(|f| {
-            let (bodies, frame) = ([a.body, b.body], frame(-f.normal));
+            let (bodies, frame) = ([a.body, b.body], frame_of_normal(-f.normal));
             ContactPoint { pair, bodies, frame, points: [f.on_shape, f.on_ground], gap: f.gap, friction }
         }));
         return;
@@ -267,6 +260,6 @@ fn between(
             continue;
         }
         let (bodies, points) = ([a.body, b.body], [on_a, on_b]);
-        out.push(ContactPoint { pair, bodies, frame: frame(n), points, gap: point.dist, friction });
+        out.push(ContactPoint { pair, bodies, frame: frame_of_normal(n), points, gap: point.dist, friction });
     }
 }

@@ -14,8 +14,8 @@
 //! or its rounds no end. Sweeps over the ports (projected Gauss–Seidel) that stay within friction and footprint then
 //! give another answer, and the one with the smaller defect counts.
 
-use crate::dense::{cholesky, cholesky_above, cholesky_solve, lu, lu_solve, rank};
 use crate::lcp::{Lemke, Outcome};
+use terraglue_numerics::in_place::{cholesky, cholesky_above, cholesky_solve, lu, lu_solve, rank};
 use terraglue_subsystem::Port;
 
 /// ε as a share of the mean diagonal of G.

@@ -5,7 +5,7 @@
 
 use crate::contact::detection::ContactPoint;
 use crate::math::V3;
-use crate::state::Motion;
+use crate::motion::Motion;
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::Persist;
 

@@ -26,10 +26,10 @@ impl PortJacobian {
     /// The derivatives at a level, n × n, column-major, at the last trial.
     pub fn at(&mut self, level: Level, list: &[Port], ports: &Ports, dynamics: &mut Dynamics) -> &[f64] {
         let n = ports.len();
-        let near = dynamics.ends_near(self.sensitivity.trial(), NEAR);
-        if !(near && self.of == dynamics.factor_count && self.matrices[0].len() == n * n) {
+        let near = self.sensitivity.is_near(dynamics, NEAR);
+        if !(near && self.of == dynamics.kkt.factor_count && self.matrices[0].len() == n * n) {
             self.take(list, ports, dynamics);
-            self.of = dynamics.factor_count;
+            self.of = dynamics.kkt.factor_count;
         }
         &self.matrices[level as usize]
     }
@@ -41,12 +41,12 @@ impl PortJacobian {
 
     fn take(&mut self, list: &[Port], ports: &Ports, dynamics: &mut Dynamics) {
         let n = ports.len();
-        dynamics.begin_answers(&mut self.sensitivity);
+        self.sensitivity.begin(dynamics);
         read(list, dynamics, &mut self.base, &mut self.t, n);
         self.matrices.iter_mut().for_each(Vec::clear);
         for c in 0..n {
             ports.load_unit(dynamics, c, self.sensitivity.load());
-            let epsilon = dynamics.answer(&mut self.sensitivity);
+            let epsilon = self.sensitivity.answer(dynamics);
             if epsilon.is_some() {
                 read(list, dynamics, &mut self.moved, &mut self.t, n);
             }
@@ -56,7 +56,7 @@ impl PortJacobian {
                 matrix.resize((c + 1) * n, 0.0);
             }
         }
-        dynamics.end_answers(&self.sensitivity);
+        self.sensitivity.end(dynamics);
     }
 }
 

@@ -4,7 +4,7 @@ use crate::dynamics::Dynamics;
 use crate::dynamics::carried::Carried;
 use crate::math::{V3, cayley, cayley_shift, cayley_vector};
 use crate::model::{Body, Model};
-use crate::state::Motion;
+use crate::motion::Motion;
 use terraglue_linear_solver::Path;
 use terraglue_robot_import::{Shape, ShapeGeometry};
 use terraglue_subsystem::{Port, PortKind, Response, component};
@@ -108,7 +108,7 @@ impl Ports {
     /// Change of the rate along component i by the impulses of the trial.
     pub fn kick(&self, dynamics: &Dynamics, i: usize) -> f64 {
         let Component { body, row, .. } = &self.components[i];
-        dynamics.kick(*body).iter().zip(row).map(|(k, r)| k * r).sum()
+        dynamics.trial.kick(*body, &dynamics.kkt, &dynamics.start).iter().zip(row).map(|(k, r)| k * r).sum()
     }
 
     /// dX_r/d(wrench c), as last computed by [`Ports::compliance`].
@@ -140,7 +140,7 @@ impl Ports {
         let unit = row.map(|r| per_force * r);
         load[at..at + 6].copy_from_slice(&unit);
         if let Some(carried) = self.components[i].carried(per_force) {
-            let moment = dynamics.turned(&carried);
+            let moment = carried.turned(&dynamics.integrator, &dynamics.trial.turns);
             load[at + 3..at + 6].iter_mut().zip(&moment).for_each(|(l, m)| *l += m);
         }
     }
@@ -150,7 +150,10 @@ impl Ports {
     /// Only along the paths of the bodies to the root: see [`Path`].
     pub fn compliance(&mut self, dynamics: &Dynamics) -> &[f64] {
         let n = self.components.len();
-        if self.g_of == dynamics.factor_count && dynamics.contacts.pressing() == 0 && self.g.len() == n * n {
+        if self.g_of == dynamics.kkt.factor_count
+            && dynamics.contacts.pressing() == 0
+            && self.g.len() == n * n
+        {
             return &self.g;
         }
         let tree = &dynamics.kkt.solver;
@@ -176,7 +179,7 @@ impl Ports {
                 self.g[i * n + k] = h2 * sum;
             }
         }
-        self.g_of = dynamics.factor_count;
+        self.g_of = dynamics.kkt.factor_count;
         if dynamics.contacts.pressing() > 0 {
             let components = &self.components;
             let rate = |p: usize, v: &[f64]| {
@@ -218,11 +221,11 @@ pub(crate) fn committed(ports: &[Port], bodies: &[Motion], out: &mut Response) {
 pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
     for port in ports {
         let b = port.body as usize;
-        let arm = V3::from(port.origin) - dynamics.starts()[b].c;
-        let mean = &dynamics.solution[dynamics.kkt.body_at[b]..];
-        let turn = cayley_vector(&dynamics.turns[b]);
+        let arm = V3::from(port.origin) - dynamics.start.bodies[b].c;
+        let mean = &dynamics.trial.solution[dynamics.kkt.body_at[b]..];
+        let turn = cayley_vector(&dynamics.trial.turns[b]);
         let linear = port.kind == PortKind::Contact as u32 && !dynamics.integrator.is_second_order();
-        let turned = if linear { turn.cross(&arm) } else { cayley_shift(&dynamics.turns[b], &arm) };
+        let turned = if linear { turn.cross(&arm) } else { cayley_shift(&dynamics.trial.turns[b], &arm) };
         let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + turned;
         for (i, c) in port.components() {
             let d = V3::from(port.direction(c));
@@ -236,10 +239,10 @@ pub(crate) fn response(ports: &[Port], dynamics: &Dynamics, out: &mut Response) 
     displacement(ports, dynamics, out.x);
     for port in ports {
         let b = port.body as usize;
-        let (start, end) = (&dynamics.starts()[b], &dynamics.ends[b]);
+        let (start, end) = (&dynamics.start.bodies[b], &dynamics.trial.ends[b]);
         let arm = V3::from(port.origin) - start.c;
         let before = start.v + start.w.cross(&arm);
-        let after = end.v + end.w.cross(&(cayley(&dynamics.turns[b]) * arm));
+        let after = end.v + end.w.cross(&(cayley(&dynamics.trial.turns[b]) * arm));
         for (i, c) in port.components() {
             let d = V3::from(port.direction(c));
             let (v0, v1) = if c < 3 { (before, after) } else { (start.w, end.w) };
@@ -254,10 +257,10 @@ pub(crate) fn response(ports: &[Port], dynamics: &Dynamics, out: &mut Response) 
 
 /// Own velocity and acceleration at t after a trial of no length; X = 0.
 pub(crate) fn standing(ports: &[Port], dynamics: &Dynamics, out: &mut Response) {
-    committed(ports, dynamics.starts(), out);
+    committed(ports, &dynamics.start.bodies, out);
     for port in ports {
         let b = port.body as usize;
-        let (motion, real) = (&dynamics.starts()[b], &dynamics.start_accelerations[b].real);
+        let (motion, real) = (&dynamics.start.bodies[b], &dynamics.start.accelerations[b].real);
         let arm = V3::from(port.origin) - motion.c;
         for (i, c) in port.components() {
             out.a[i] = along(port, c, real, &motion.w, &arm);
@@ -268,8 +271,8 @@ pub(crate) fn standing(ports: &[Port], dynamics: &Dynamics, out: &mut Response) 
 /// Acceleration of the material point at the port's origin (angular: of the body) at the end of the trial.
 fn acceleration(port: &Port, dynamics: &Dynamics, c: usize) -> f64 {
     let b = port.body as usize;
-    let (end, real) = (&dynamics.ends[b], &dynamics.end_accelerations[b].real);
-    let arm = cayley(&dynamics.turns[b]) * (V3::from(port.origin) - dynamics.starts()[b].c);
+    let (end, real) = (&dynamics.trial.ends[b], &dynamics.trial.accelerations[b].real);
+    let arm = cayley(&dynamics.trial.turns[b]) * (V3::from(port.origin) - dynamics.start.bodies[b].c);
     along(port, c, real, &end.w, &arm)
 }
 

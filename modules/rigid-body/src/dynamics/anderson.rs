@@ -6,7 +6,7 @@
 //! corrections tell of these directions, x ← x + f − (ΔX + ΔF)·γ with γ = argmin |f − ΔF·γ| (Anderson 1965; for linear
 //! problems this is GMRES, Walker and Ni 2011), brings them back without a derivative.
 
-use crate::dense::{cholesky, cholesky_solve};
+use terraglue_numerics::in_place::{cholesky, cholesky_solve};
 
 /// Corrections that are remembered.
 const MEMORY: usize = 6;

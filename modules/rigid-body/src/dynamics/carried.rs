@@ -5,7 +5,7 @@
 //! with them, else moments are off by the order of the step. For the midpoint rule the mean arm also makes the work on
 //! the body that of the force on its point: (R − 1)·arm = θ × mean arm for the Cayley transform R of θ.
 
-use super::Dynamics;
+use super::scheme::Integrator;
 use crate::math::{V3, cayley_shift};
 
 /// An impulse on a point of a body, or below one: a ball is pressed at its lowest point, which stays below its centre.
@@ -18,23 +18,13 @@ pub(crate) struct Carried {
     pub force: V3,
 }
 
-impl Dynamics {
-    /// Moment that the turning of its arm adds to an impulse, N m s.
-    pub fn turned(&self, carried: &Carried) -> V3 {
-        if !self.integrator.is_second_order() {
+impl Carried {
+    /// Moment that the turning of its arm adds to the impulse, N m s; `turns`: rotation vectors of the bodies.
+    pub fn turned(&self, integrator: &Integrator, turns: &[V3]) -> V3 {
+        if !integrator.is_second_order() {
             return V3::zeros();
         }
-        let shift = cayley_shift(&self.turns[carried.body], &carried.arm);
-        (self.integrator.force_time() * shift).cross(&carried.force)
-    }
-
-    /// Adds to `correction` what turned arms change of the external impulses.
-    pub(super) fn turn_carried(&mut self) {
-        for k in 0..self.carried.len() {
-            let carried = self.carried[k];
-            let moment = self.turned(&carried);
-            let at = self.kkt.body_at[carried.body] + 3;
-            self.correction[at..at + 3].iter_mut().zip(&moment).for_each(|(c, m)| *c += m);
-        }
+        let shift = cayley_shift(&turns[self.body], &self.arm);
+        (integrator.force_time() * shift).cross(&self.force)
     }
 }

@@ -4,8 +4,10 @@
 //! as h·(2·kd + h·kp)/I < 4 (Jury's criterion on z² − (2 − a − b)·z + 1 − a, a = h·kd/I, b = h²·kp/I). For several
 //! joints I⁻¹ is the matrix J·K⁻¹·Jᵀ of their rates under unit impulses, and the largest eigenvalue counts.
 
+use super::kkt::Kkt;
 use super::{Dynamics, Failure};
-use crate::drive::Motor;
+use crate::joint::Joint;
+use crate::motor::Motor;
 use crate::state::{JointState, State};
 
 /// Steps of the power iteration; its value never exceeds the eigenvalue.
@@ -18,43 +20,52 @@ fn weight(j: &JointState, h: f64) -> f64 {
     if explicit { h * (2.0 * j.damping + h * j.stiffness) } else { 0.0 }
 }
 
-impl Dynamics {
-    /// Checks the gains where they or the length of the step changed; the step is prepared.
-    pub(super) fn check_explicit(&mut self, state: &State) -> Result<(), Failure> {
-        let h = self.h;
-        let now = || state.joints.iter().map(|j| weight(j, h));
-        if self.explicit.iter().copied().eq(now()) {
-            return Ok(());
-        }
-        self.explicit.clear();
-        self.explicit.extend(now());
-        if self.explicit.iter().all(|w| *w == 0.0) {
-            return Ok(());
-        }
-        self.ensure_factor()?;
-        let (largest, joint) = self.largest_eigenvalue();
-        if largest < LIMIT {
-            return Ok(());
-        }
-        self.explicit.clear();
-        let joint = self.model.joints[joint].name.clone();
-        Err(Failure::Explicit { joint, h, share: LIMIT / largest })
+/// The gains of explicit motors that were checked last.
+pub(crate) struct ExplicitGains {
+    /// Per joint what its motor weighs; 0: it is none.
+    weights: Vec<f64>,
+}
+
+impl ExplicitGains {
+    /// For so many joints.
+    pub fn new(joints: usize) -> Self {
+        Self { weights: vec![0.0; joints] }
     }
 
-    /// Of J·K⁻¹·Jᵀ·diag(weights), and the joint that moves most in it.
-    fn largest_eigenvalue(&mut self) -> (f64, usize) {
-        let n = self.explicit.len();
+    /// Takes over the gains at a step of length h; whether any are to be checked that were not.
+    fn take(&mut self, state: &State, h: f64) -> bool {
+        let now = || state.joints.iter().map(|j| weight(j, h));
+        if self.weights.iter().copied().eq(now()) {
+            return false;
+        }
+        self.weights.clear();
+        self.weights.extend(now());
+        self.weights.iter().any(|w| *w != 0.0)
+    }
+
+    /// Largest eigenvalue of J·K⁻¹·Jᵀ·diag(weights), and the joint that moves most in it; `buffer`: as long as the unknowns.
+    fn largest_eigenvalue(&self, joints: &[Joint], kkt: &Kkt, buffer: &mut [f64]) -> (f64, usize) {
+        let (n, weights) = (self.weights.len(), &self.weights);
+        let free = |j: usize| joints[j].free_row();
         // No pattern of a robot is orthogonal to this start.
         let mut x: Vec<f64> = (0..n).map(|j| 1.0 + 0.37 * ((7 * j) % 5) as f64).collect();
         let mut value = 0.0;
         for _ in 0..ITERATIONS {
-            self.correction.fill(0.0);
+            buffer.fill(0.0);
             for j in 0..n {
-                self.add_impulse(j, self.explicit[j] * x[j]);
+                let impulse = weights[j] * x[j];
+                if let Some(free) = free(j).filter(|_| impulse != 0.0) {
+                    kkt.push(buffer, &joints[j], &kkt.rows[j], free, impulse);
+                }
             }
-            self.kkt.solver.substitute(&mut self.correction);
-            let y: Vec<f64> = (0..n).map(|j| self.free_rate_of(j)).collect();
-            let product = |a: &[f64], b: &[f64]| (0..n).map(|j| self.explicit[j] * a[j] * b[j]).sum::<f64>();
+            kkt.solver.substitute(buffer);
+            // 0 where a joint is not weighed
+            let rate = |j: usize| {
+                let free = free(j).filter(|_| weights[j] > 0.0);
+                free.map_or(0.0, |free| kkt.rates(j, &joints[j], buffer)[free])
+            };
+            let y: Vec<f64> = (0..n).map(rate).collect();
+            let product = |a: &[f64], b: &[f64]| (0..n).map(|j| weights[j] * a[j] * b[j]).sum::<f64>();
             value = product(&x, &y) / product(&x, &x);
             let size = product(&y, &y).sqrt();
             if !(size > 0.0) {
@@ -62,25 +73,27 @@ impl Dynamics {
             }
             x = y.iter().map(|y| y / size).collect();
         }
-        let most = |j: &usize| self.explicit[*j] * x[*j] * x[*j];
+        let most = |j: &usize| weights[*j] * x[*j] * x[*j];
         let joint = (0..n).max_by(|a, b| most(a).total_cmp(&most(b))).unwrap_or(0);
         (value, joint)
     }
+}
 
-    /// Adds an impulse along the free axis of a joint to `correction`.
-    fn add_impulse(&mut self, j: usize, impulse: f64) {
-        let joint = &self.model.joints[j];
-        let Some(free) = joint.free_row().filter(|_| impulse != 0.0) else { return };
-        let parent = joint.parent.map(|p| (p, self.rows[j].on_parent(free)));
-        for (body, row) in [Some((joint.child, self.rows[j].on_child(free))), parent].into_iter().flatten() {
-            let at = self.kkt.body_at[body];
-            self.correction[at..at + 6].iter_mut().zip(row).for_each(|(c, r)| *c += impulse * r);
+impl Dynamics {
+    /// Checks the gains where they or the length of the step changed; the step is prepared.
+    pub(super) fn check_explicit(&mut self, state: &State) -> Result<(), Failure> {
+        let h = self.h;
+        if !self.explicit.take(state, h) {
+            return Ok(());
         }
-    }
-
-    /// Rate of the free axis of a joint in `correction`; 0 where it is not weighed.
-    fn free_rate_of(&self, j: usize) -> f64 {
-        let free = self.model.joints[j].free_row().filter(|_| self.explicit[j] > 0.0);
-        free.map_or(0.0, |free| self.rates(j, &self.correction)[free])
+        self.ensure_factor()?;
+        let (largest, joint) =
+            self.explicit.largest_eigenvalue(&self.model.joints, &self.kkt, &mut self.correction);
+        if largest < LIMIT {
+            return Ok(());
+        }
+        self.explicit.weights.clear();
+        let joint = self.model.joints[joint].name.clone();
+        Err(Failure::Explicit { joint, h, share: LIMIT / largest })
     }
 }

@@ -2,7 +2,6 @@
 
 use super::{Dynamics, Failure};
 use crate::dynamics::joint_rows::gap;
-use crate::math::{V3, cayley};
 
 /// Joints are closed to this at the end of every step, m and rad.
 const GAP_TOLERANCE: f64 = 1e-11;
@@ -23,7 +22,7 @@ impl Dynamics {
     pub(super) fn close_joints(&mut self) -> Result<(), Failure> {
         let (mut least, mut since, mut mixed) = (f64::INFINITY, 0, None);
         for round in 0..MAX_CORRECTIONS {
-            self.find_places();
+            self.trial.find_places(&self.kkt, &self.start, self.h);
             let open = self.gaps_into_correction().1;
             if open <= GAP_TOLERANCE {
                 return Ok(());
@@ -44,16 +43,16 @@ impl Dynamics {
                 self.kkt.solver.substitute(&mut self.correction);
             }
             if let Some(rounds) = &mut mixed {
-                self.anderson.mix(*rounds, &self.solution, &mut self.correction);
+                self.anderson.mix(*rounds, &self.trial.solution, &mut self.correction);
                 *rounds += 1;
             }
-            self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
+            self.trial.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
             if mixed.is_none() && self.surely_closes() {
-                self.find_places();
+                self.trial.find_places(&self.kkt, &self.start, self.h);
                 return Ok(());
             }
         }
-        self.find_places();
+        self.trial.find_places(&self.kkt, &self.start, self.h);
         self.check_gaps()
     }
 
@@ -62,10 +61,10 @@ impl Dynamics {
     /// moves bodies by up to m along each axis (m, rad), joints are left open by at most 2(θ + m)·2√3·m(1 + arm).
     fn surely_closes(&self) -> bool {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let moved = 2.0 * self.h * largest(&self.correction[..6 * self.ends.len()]);
-        let turned = self.turns.iter().fold(0.0_f64, |m, t| m.max(t.norm_squared())).sqrt();
+        let moved = 2.0 * self.h * largest(&self.correction[..6 * self.trial.ends.len()]);
+        let turned = self.trial.turns.iter().fold(0.0_f64, |m, t| m.max(t.norm_squared())).sqrt();
         // A NaN is never sure.
-        !self.closes() && 4.0 * (turned + moved) * moved * (1.0 + self.longest_arm) <= GAP_TOLERANCE
+        !self.closing.any() && 4.0 * (turned + moved) * moved * (1.0 + self.longest_arm) <= GAP_TOLERANCE
     }
 
     /// Refuses a step that leaves a joint or a loop open.
@@ -86,9 +85,9 @@ impl Dynamics {
         let mut worst = (0, 0.0);
         self.correction.fill(0.0);
         let per_step = 1.0 / self.h;
-        for (j, joint) in self.model.joints.iter().enumerate().filter(|(j, _)| !self.broken[*j]) {
+        for (j, joint) in self.model.joints.iter().enumerate().filter(|(j, _)| !self.branches.broken[*j]) {
             let row = &mut self.correction[self.kkt.joint_at[j]..][..6];
-            for (row, open) in row.iter_mut().zip(gap(joint, &self.ends)) {
+            for (row, open) in row.iter_mut().zip(gap(joint, &self.trial.ends)) {
                 *row = -open * per_step;
                 // A NaN is the worst and stays it.
                 if open.abs() > worst.1 || open.is_nan() {
@@ -96,41 +95,22 @@ impl Dynamics {
                 }
             }
         }
-        let (closure, open) = self.closures_into_correction();
+        let (closure, open) = self.closing.open_into(
+            &self.model,
+            &self.start,
+            &self.trial.ends,
+            &self.kkt,
+            self.h,
+            &mut self.correction,
+        );
         if open > worst.1 || open.is_nan() {
             worst = (self.model.joints.len() + closure, open);
         }
         worst
     }
 
-    /// Positions and rates at the end of the step from `solution`.
-    pub(super) fn find_ends(&mut self) {
-        self.find_places();
-        (0..self.ends.len()).for_each(|b| self.find_rates(b));
-    }
-
-    /// Positions at the end of the step.
-    pub(super) fn find_places(&mut self) {
-        for b in 0..self.ends.len() {
-            let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
-            let u = &self.solution[at..at + 6];
-            let (v, w) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]));
-            let turn = self.h * (w + self.middle_rate[b] - self.free_rate[b]);
-            let mut q = cayley(&turn) * start.q;
-            q.renormalize_fast();
-            self.turns[b] = turn;
-            (self.ends[b].c, self.ends[b].q) = (start.c + self.h * v, q);
-        }
-    }
-
     /// Rates of a body at the end of the step, after its position.
     pub fn find_rates(&mut self, b: usize) {
-        let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
-        let u = &self.solution[at..at + 6];
-        let (v, w, q) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]), self.ends[b].q);
-        // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
-        let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
-        let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
-        (self.ends[b].v, self.ends[b].w) = (v, rate);
+        self.trial.find_rates(b, &self.model.bodies[b], &self.kkt, &self.start);
     }
 }

@@ -3,9 +3,9 @@
 //! Rows 0–2: translation of the child's anchor against the parent's along axis, t1, t2; rows 3–5: rotation about
 //! them. The frame is the parent's. A revolute joint leaves row 3 free, a prismatic one row 0.
 
+use crate::joint::{Joint, Kind};
 use crate::math::{Q, V3, unwrap_angle};
-use crate::model::{Joint, Kind};
-use crate::state::Motion;
+use crate::motion::Motion;
 use terraglue_linear_solver::Rows;
 
 fn world() -> Motion {

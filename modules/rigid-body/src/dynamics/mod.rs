@@ -11,6 +11,7 @@
 
 mod alpha;
 mod anderson;
+mod branches;
 pub(crate) mod carried;
 mod closing;
 mod explicit;
@@ -23,20 +24,27 @@ mod reaction;
 pub(crate) mod scheme;
 mod second_order;
 pub(crate) mod sensitivity;
+mod start;
 mod swinging;
+mod trial;
 
 use crate::contact::bodies::{BodyContacts, Unsolved};
-use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
-use crate::math::{M3, V3, cayley};
-use crate::model::{Joint, Kind, Model};
-use crate::state::{Load, Motion, State};
+use crate::drive::{MOST_YIELDING, Span};
+use crate::joint::{Joint, Kind};
+use crate::model::Model;
+use crate::motion::Motion;
+use crate::state::State;
 use anderson::Anderson;
+use branches::Branches;
 use carried::Carried;
 use closing::Closing;
+use explicit::ExplicitGains;
 use joint_rows::Stand;
 use kkt::Kkt;
-use scheme::{Acceleration, Integrator};
-use terraglue_linear_solver::{Error as SolverError, Rows};
+use scheme::Integrator;
+use start::StepStart;
+use terraglue_linear_solver::Error as SolverError;
+use trial::Trial;
 
 /// Rounds in which all axes change branch at once; after them one at a time.
 const FREE_ROUNDS: usize = 8;
@@ -85,7 +93,7 @@ pub(crate) struct AxisResult {
     pub impulse: f64,
 }
 
-/// Everything about the step in hand and the last trial; buffers are reused.
+/// The step in hand and the last trial of it; buffers are reused.
 pub(crate) struct Dynamics {
     pub model: Model,
     pub kkt: Kkt,
@@ -93,37 +101,15 @@ pub(crate) struct Dynamics {
     closing: Closing,
     pub h: f64,
     pub integrator: Integrator,
-    starts: Vec<Motion>,
-    /// Accelerations at both ends of the step and what else the second-order option reads of the state.
-    pub start_accelerations: Vec<Acceleration>,
-    pub end_accelerations: Vec<Acceleration>,
-    angles: Vec<f64>,
-    loads: Vec<Load>,
-    inertia: Vec<M3>,
-    /// World rates of free rotation in the middle and at the end of the step.
-    middle_rate: Vec<V3>,
-    free_rate: Vec<V3>,
-    rows: Vec<Rows>,
-    pub axes: Vec<Axis>,
-    /// See [`YIELDING`].
-    pub yielding: f64,
+    pub start: StepStart,
+    pub branches: Branches,
     /// Per axis: change of the coordinate over h less J·v⁺, from the curvature of the motion.
     curvature: Vec<f64>,
-    broken: Vec<bool>,
     /// From a centre of mass to a joint at most, m; infinite where that does not bound how rows turn.
     longest_arm: f64,
     base_rhs: Vec<f64>,
-    /// Rates of the force-free motion.
-    free: Vec<f64>,
-    compliance: Vec<[Option<f64>; 6]>,
-    /// Branches of all axes for which the factor stands.
-    pub modes: Vec<Mode>,
-    next_modes: Vec<Mode>,
-    factored: bool,
     /// Whether trials leave out what the commit alone asks for (see [`Dynamics::complete`]).
     lean: bool,
-    /// Counts factorisations; tells whether a compliance matrix is still valid.
-    pub factor_count: u64,
     /// External impulses of the trial, laid out as the unknowns.
     pub external: Vec<f64>,
     /// Those of them that act on points of bodies.
@@ -131,20 +117,14 @@ pub(crate) struct Dynamics {
     rhs: Vec<f64>,
     correction: Vec<f64>,
     anderson: Anderson,
-    /// Per joint what its explicit PD motor weighs, as checked last.
-    explicit: Vec<f64>,
-    /// Rates and (negative) impulses of the trial.
-    pub solution: Vec<f64>,
-    /// Motion at the end of the trial and rotation vector (before the Cayley transform) of each body.
-    pub ends: Vec<Motion>,
-    pub turns: Vec<V3>,
+    explicit: ExplicitGains,
+    pub trial: Trial,
 }
 
 impl Dynamics {
     pub fn new(model: Model, integrator: Integrator, bodies: &[Motion]) -> Result<Self, SolverError> {
         let kkt = Kkt::new(&model)?;
         let (nb, nj, n) = (model.bodies.len(), model.joints.len(), kkt.len());
-        let rest = Motion::at(V3::zeros(), crate::math::Q::identity());
         // What slides changes its lever beyond any turn, and rows of universal joints turn faster than their bodies.
         let arm = |j: &Joint| match j.kind {
             Kind::Fixed | Kind::Revolute | Kind::Spherical => {
@@ -159,36 +139,18 @@ impl Dynamics {
             kkt,
             h: 0.0,
             integrator,
-            starts: vec![rest; nb],
-            start_accelerations: vec![Acceleration::default(); nb],
-            end_accelerations: vec![Acceleration::default(); nb],
-            angles: vec![0.0; nj],
-            loads: vec![Load::default(); nb],
-            inertia: vec![M3::zeros(); nb],
-            middle_rate: vec![V3::zeros(); nb],
-            free_rate: vec![V3::zeros(); nb],
-            rows: vec![Rows::default(); nj],
-            axes: vec![Axis::idle(); nj],
-            yielding: 0.0,
+            start: StepStart::new(nb, nj, n),
+            branches: Branches::new(nj),
             curvature: vec![0.0; nj],
-            broken: vec![false; nj],
             base_rhs: vec![0.0; n],
-            free: vec![0.0; n],
-            compliance: vec![[None; 6]; nj],
-            modes: vec![Mode::Free; nj],
-            next_modes: vec![Mode::Free; nj],
-            factored: false,
             lean: false,
-            factor_count: 0,
             external: vec![0.0; n],
             carried: Vec::new(),
             rhs: vec![0.0; n],
             correction: vec![0.0; n],
             anderson: Anderson::new(n, 6 * nb),
-            explicit: vec![0.0; nj],
-            solution: vec![0.0; n],
-            ends: vec![rest; nb],
-            turns: vec![V3::zeros(); nb],
+            explicit: ExplicitGains::new(nj),
+            trial: Trial::new(nb, n),
             model,
         })
     }
@@ -196,14 +158,14 @@ impl Dynamics {
     /// Linearises the step of length h from a state; the factor is made by the first trial.
     pub fn prepare(&mut self, state: &State, h: f64) -> Result<(), Failure> {
         self.h = h;
-        self.starts.clone_from(&state.bodies);
-        self.factored = false;
+        self.start.take(state);
+        self.kkt.factored = false;
         if self.integrator.is_second_order() {
             return self.prepare_second_order(state);
         }
         self.prepare_bodies(state);
-        self.contacts.detect(&self.starts, h, &state.pressed);
-        self.yielding = if self.contacts.any() { YIELDING } else { 0.0 };
+        self.contacts.detect(&self.start.bodies, h, &state.pressed);
+        self.branches.yield_where(self.contacts.any());
         self.prepare_joints(state);
         self.check_explicit(state)
     }
@@ -211,11 +173,11 @@ impl Dynamics {
     /// After a step without a consistent state: rigid motors give way ten times as much. False: no more of that.
     /// Coulomb's law is not monotone, so a motor that pushes a sliding foot may belong neither at its bound nor below.
     pub fn soften(&mut self, state: &State) -> bool {
-        if self.yielding <= 0.0 || self.yielding >= MOST_YIELDING {
+        if self.branches.yielding <= 0.0 || self.branches.yielding >= MOST_YIELDING {
             return false;
         }
-        self.yielding *= 10.0;
-        self.factored = false;
+        self.branches.yielding *= 10.0;
+        self.kkt.factored = false;
         self.prepare_joints(state);
         true
     }
@@ -228,16 +190,12 @@ impl Dynamics {
     fn prepare_bodies(&mut self, state: &State) {
         let h = self.h;
         for (b, body) in self.model.bodies.iter().enumerate() {
-            let m = &self.starts[b];
-            let r = m.q.to_rotation_matrix();
-            self.inertia[b] = r * body.inertia * r.transpose();
-            let (middle, end) = gyro::free_rotation(&body.inertia, &m.q.inverse_transform_vector(&m.w), h);
-            // Rates at the end are given in the axes of the turned body.
-            self.middle_rate[b] = m.q * middle;
-            self.free_rate[b] = cayley(&(h * self.middle_rate[b])) * (m.q * end);
-            let load = &state.loads[b];
-            let push = body.mass * m.v + h * (body.mass * self.model.gravity + load.force);
-            let spin = self.inertia[b] * self.free_rate[b] + h * load.moment;
+            let m = &self.start.bodies[b];
+            self.kkt.turn_inertia(b, body, &m.q);
+            self.start.rotate_freely(b, body, h);
+            let (v, load) = (self.start.bodies[b].v, &state.loads[b]);
+            let push = body.mass * v + h * (body.mass * self.model.gravity + load.force);
+            let spin = self.kkt.inertia[b] * self.start.free_rate[b] + h * load.moment;
             let at = self.kkt.body_at[b];
             self.base_rhs[at..at + 3].copy_from_slice(push.as_slice());
             self.base_rhs[at + 3..at + 6].copy_from_slice(spin.as_slice());
@@ -246,23 +204,17 @@ impl Dynamics {
 
     fn prepare_joints(&mut self, state: &State) {
         // The force-free motion is the point of linearisation.
-        for b in 0..self.starts.len() {
-            let at = self.kkt.body_at[b];
-            self.free[at..at + 3].copy_from_slice(self.starts[b].v.as_slice());
-            self.free[at + 3..at + 6].copy_from_slice(self.free_rate[b].as_slice());
-        }
-        self.solution.copy_from_slice(&self.free);
-        self.find_places();
+        self.start.go_on_freely(&self.kkt.body_at);
+        self.trial.solution.copy_from_slice(&self.start.free);
+        self.trial.find_places(&self.kkt, &self.start, self.h);
         let span = self.span(state, self.h, 1.0);
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
-            self.broken[j] = s.broken;
-            self.rows[j] = joint_rows::rows(joint, &self.starts);
-            self.axes[j].renew(s, joint.limits, &span);
-            self.modes[j] = self.axes[j].start(s.mode);
-            let stand = Stand::of(joint, &self.ends);
+            self.kkt.rows[j] = joint_rows::rows(joint, &self.start.bodies);
+            self.branches.renew(j, joint, s, &span);
+            let stand = Stand::of(joint, &self.trial.ends);
             let open = stand.gap(joint);
-            let rates = self.rates(j, &self.free);
+            let rates = self.kkt.rates(j, joint, &self.start.free);
             let at = self.kkt.joint_at[j];
             if let Some(free) = joint.free_row() {
                 let travel = stand.coordinate(joint, s.angle) - s.angle;
@@ -275,57 +227,50 @@ impl Dynamics {
             }
         }
         self.prepare_closures(state);
-        self.close_base();
+        self.closing.close_base(&self.kkt, &self.start.free, self.h, &mut self.base_rhs);
+    }
+
+    /// Takes over which connections beyond the tree are broken; their rows and values, linearised at the ends of the trial.
+    fn prepare_closures(&mut self, state: &State) {
+        let rule = (self.h, &self.integrator);
+        self.closing.prepare(&self.model, &self.start, &self.trial.ends, rule, state);
     }
 
     /// For which step axes are made; `when`: see [`Span`].
     fn span(&self, state: &State, h: f64, when: f64) -> Span {
         let impacts = !self.integrator.is_second_order();
-        Span { h, when, supply_v: state.supply.limit, yielding: self.yielding, impacts }
-    }
-
-    /// J·v of all rows of joint j.
-    fn rates(&self, j: usize, v: &[f64]) -> [f64; 6] {
-        let joint = &self.model.joints[j];
-        let of = |b: usize| &v[self.kkt.body_at[b]..][..6];
-        self.rows[j].rates(of(joint.child), joint.parent.map(of))
-    }
-
-    /// J·v of one row of joint j.
-    fn rate(&self, j: usize, row: usize, v: &[f64]) -> f64 {
-        let joint = &self.model.joints[j];
-        let of = |b: usize| &v[self.kkt.body_at[b]..][..6];
-        self.rows[j].rate(row, of(joint.child), joint.parent.map(of))
+        Span { h, when, supply_v: state.supply.limit, yielding: self.branches.yielding, impacts }
     }
 
     /// The free axis of joint j in the trial; none where nothing moves or it is broken.
     pub fn axis_result(&self, j: usize) -> Option<AxisResult> {
         let joint = &self.model.joints[j];
-        let free = joint.free_row().filter(|_| !self.broken[j])?;
+        let free = self.branches.free(j, joint)?;
         if self.integrator.is_second_order() {
             return Some(self.axis_result_second_order(j, free));
         }
-        let rate = self.rate(j, free, &self.solution);
-        let mean_rate = 0.5 * (rate + self.rate(j, free, &self.free));
+        let rate = self.kkt.rate(j, joint, free, &self.trial.solution);
+        let mean_rate = 0.5 * (rate + self.kkt.rate(j, joint, free, &self.start.free));
         let (rate, impulse) = (rate + self.curvature[j], self.impulse_of(j, free));
         Some(AxisResult { rate, end_rate: rate, mean_rate, impulse })
     }
 
     /// What decides on the branch of an axis: the change of its coordinate over h, and its impulse.
     fn axis_state(&self, j: usize) -> Option<(f64, f64)> {
-        let free = self.model.joints[j].free_row().filter(|_| !self.broken[j])?;
-        Some(if self.integrator.is_second_order() {
-            (self.travel(j) / self.h, self.impulse_of(j, free))
-        } else {
-            (self.rate(j, free, &self.solution) + self.curvature[j], self.impulse_of(j, free))
-        })
+        let joint = &self.model.joints[j];
+        let free = self.branches.free(j, joint)?;
+        let rate = match self.integrator.is_second_order() {
+            true => self.travel(j) / self.h,
+            false => self.kkt.rate(j, joint, free, &self.trial.solution) + self.curvature[j],
+        };
+        Some((rate, self.impulse_of(j, free)))
     }
 
     /// Impulse along the free axis of a joint in the trial.
     fn impulse_of(&self, j: usize, free: usize) -> f64 {
-        match self.axes[j].row(self.modes[j]) {
-            Some(_) => -self.solution[self.kkt.joint_at[j] + free] / self.integrator.force_weight(),
-            None => self.axes[j].impulse(self.modes[j]),
+        match self.branches.row(j) {
+            Some(_) => -self.trial.solution[self.kkt.joint_at[j] + free] / self.integrator.force_weight(),
+            None => self.branches.impulse(j),
         }
     }
 
@@ -333,13 +278,7 @@ impl Dynamics {
     /// what the kinetic energy misses.
     pub fn contact_work(&self) -> f64 {
         let at = |v| self.contacts.work(&self.kkt.body_at, v);
-        0.5 * (at(&self.free) + at(&self.solution))
-    }
-
-    /// Change of the rates of a body by all impulses of the trial.
-    pub fn kick(&self, body: usize) -> [f64; 6] {
-        let at = self.kkt.body_at[body];
-        std::array::from_fn(|k| self.solution[at + k] - self.free[at + k])
+        0.5 * (at(&self.start.free) + at(&self.trial.solution))
     }
 
     fn factor(&mut self) -> Result<(), SolverError> {
@@ -347,36 +286,40 @@ impl Dynamics {
         for (j, joint) in self.model.joints.iter().enumerate() {
             let rigid = joint.rigid();
             for r in 0..6 {
-                self.compliance[j][r] = match joint.free_row() {
-                    _ if self.broken[j] => None,
-                    Some(free) if free == r => self.axes[j].row(self.modes[j]).map(|(c, _)| c / weight),
+                self.kkt.compliance[j][r] = match joint.free_row() {
+                    _ if self.branches.broken[j] => None,
+                    Some(free) if free == r => self.branches.row(j).map(|(c, _)| c / weight),
                     _ => rigid[r].then_some(0.0),
                 };
             }
         }
-        self.kkt.factor(&self.inertia, &self.rows, &self.compliance, &self.closing.cuts)?;
-        self.factored = true;
-        self.factor_count += 1;
+        self.kkt.factor(&self.closing.cuts)?;
+        self.kkt.factored = true;
+        self.kkt.factor_count += 1;
         // Rigid rows along axes are asked for their impulses by every trial.
         let rigid =
             |(joint, c): (&Joint, &[Option<f64>; 6])| joint.free_row().is_some_and(|r| c[r] == Some(0.0));
-        let plain = !self.integrator.is_second_order() && !self.contacts.any() && !self.closes();
-        self.lean = plain && !self.model.joints.iter().zip(&self.compliance).any(rigid);
+        self.lean = self.is_plain() && !self.model.joints.iter().zip(&self.kkt.compliance).any(rigid);
         Ok(())
+    }
+
+    /// Whether nothing but a tree of joints is to be solved, in first order.
+    fn is_plain(&self) -> bool {
+        !self.integrator.is_second_order() && !self.contacts.any() && !self.closing.any()
     }
 
     /// Makes the factor for the current branches if there is none.
     pub fn ensure_factor(&mut self) -> Result<(), Failure> {
-        if !self.factored {
+        if !self.kkt.factored {
             self.factor()?;
         }
         Ok(())
     }
 
-    /// Solves the step under `external`; the result is in `solution`, `ends`, `turns` and `modes`.
+    /// Solves the step under `external`; the result is in `trial` and `branches`.
     pub fn solve(&mut self) -> Result<(), Failure> {
-        let soft = self.yielding <= 0.0 || self.yielding >= MOST_YIELDING;
-        let rounds = FREE_ROUNDS + if soft { 8 * self.axes.len() + 8 } else { SINGLE_ROUNDS };
+        let soft = self.branches.yielding <= 0.0 || self.branches.yielding >= MOST_YIELDING;
+        let rounds = FREE_ROUNDS + if soft { 8 * self.branches.len() + 8 } else { SINGLE_ROUNDS };
         for round in 0..rounds {
             self.ensure_factor()?;
             let one_at_a_time = round >= FREE_ROUNDS;
@@ -394,7 +337,7 @@ impl Dynamics {
                     self.solve_branch()?;
                     if !self.change_branches(one_at_a_time) {
                         self.complete_impulses();
-                        return Err(self.explained(open));
+                        return Err(swinging::explained(self, open));
                     }
                 }
                 Ok(()) if !self.change_branches(one_at_a_time) => return Ok(()),
@@ -405,10 +348,9 @@ impl Dynamics {
     }
 
     /// Like [`Dynamics::solve`] where nothing but the branches of the axes is asked for: where the present ones hold, the
-    /// joints are not closed to the last, and `ends` and `turns` stay as they were.
+    /// joints are not closed to the last, and the ends of the trial stay as they were.
     pub fn find_branches(&mut self) -> Result<(), Failure> {
-        let plain = !self.integrator.is_second_order() && !self.contacts.any() && !self.closes();
-        if plain {
+        if self.is_plain() {
             self.ensure_factor()?;
             self.solve_branch()?;
             if !self.change_branches(false) {
@@ -422,11 +364,11 @@ impl Dynamics {
     fn solve_branch(&mut self) -> Result<(), Failure> {
         self.assemble();
         if self.lean {
-            self.kkt.solver.solve_rates(&self.rhs, &mut self.solution)?;
+            self.kkt.solver.solve_rates(&self.rhs, &mut self.trial.solution)?;
             return Ok(());
         }
-        self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
-        self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution)?;
+        self.kkt.solver.solve(&self.rhs, &mut self.trial.solution)?;
+        self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.trial.solution)?;
         Ok(())
     }
 
@@ -435,22 +377,14 @@ impl Dynamics {
             *rhs = base + external;
         }
         for (j, joint) in self.model.joints.iter().enumerate() {
-            let Some(free) = joint.free_row().filter(|_| !self.broken[j]) else { continue };
-            if let Some((_, b)) = self.axes[j].row(self.modes[j]) {
+            let Some(free) = self.branches.free(j, joint) else { continue };
+            if let Some((_, b)) = self.branches.row(j) {
                 self.rhs[self.kkt.joint_at[j] + free] = b - self.curvature[j];
                 continue;
             }
-            let impulse = self.axes[j].impulse(self.modes[j]);
-            if impulse == 0.0 {
-                continue;
-            }
-            let mut add = |body: usize, row: [f64; 6]| {
-                let at = self.kkt.body_at[body];
-                self.rhs[at..at + 6].iter_mut().zip(row).for_each(|(r, j)| *r += impulse * j);
-            };
-            add(joint.child, self.rows[j].on_child(free));
-            if let Some(parent) = joint.parent {
-                add(parent, self.rows[j].on_parent(free));
+            let impulse = self.branches.impulse(j);
+            if impulse != 0.0 {
+                self.kkt.push(&mut self.rhs, joint, &self.kkt.rows[j], free, impulse);
             }
         }
     }
@@ -458,24 +392,15 @@ impl Dynamics {
     /// Moves axes to the branch on which their solution lies; false when all are there.
     fn change_branches(&mut self, one_at_a_time: bool) -> bool {
         let mut changed = false;
-        self.next_modes.clone_from(&self.modes);
-        for j in 0..self.axes.len() {
-            let Some((rate, impulse)) = self.axis_state(j) else { continue };
-            let next = self.axes[j].next(self.modes[j], rate, impulse);
-            if next != self.modes[j] && !(one_at_a_time && changed) {
-                self.next_modes[j] = next;
-                changed = true;
-            }
+        self.branches.begin_changes();
+        for j in 0..self.branches.len() {
+            let Some(lies) = self.axis_state(j) else { continue };
+            changed |= self.branches.propose(j, lies, !(one_at_a_time && changed));
         }
         if changed {
-            std::mem::swap(&mut self.modes, &mut self.next_modes);
-            self.factored = false;
+            self.branches.accept_changes();
+            self.kkt.factored = false;
         }
         changed
-    }
-
-    /// Motion at the start of the step.
-    pub fn starts(&self) -> &[Motion] {
-        &self.starts
     }
 }

@@ -8,7 +8,7 @@ impl Dynamics {
     /// What the commit asks for beyond a trial: rates at the end of the step, impulses of rigid rows.
     pub fn complete(&mut self) {
         if !self.integrator.is_second_order() {
-            (0..self.ends.len()).for_each(|b| self.find_rates(b));
+            (0..self.trial.ends.len()).for_each(|b| self.find_rates(b));
             self.complete_impulses();
         }
     }
@@ -16,7 +16,7 @@ impl Dynamics {
     /// Impulses of rigid rows, where trials leave them out.
     pub(super) fn complete_impulses(&mut self) {
         if self.lean {
-            self.kkt.complete(&self.inertia, &self.rhs, &mut self.solution);
+            self.kkt.complete(&self.rhs, &mut self.trial.solution);
         }
     }
 
@@ -24,14 +24,14 @@ impl Dynamics {
     /// parent feels the opposite. `axis`: impulse along the free axis, N m s or N s. Mean of the step in first order,
     /// at its end (generalized-α) or in its middle in second.
     pub fn reaction(&self, j: usize, axis: f64) -> [f64; 6] {
-        if self.broken[j] {
+        if self.branches.broken[j] {
             return [0.0; 6];
         }
         let joint = &self.model.joints[j];
         let rows = match self.integrator {
-            Integrator::SymplecticEuler => self.rows[j],
-            Integrator::GeneralizedAlpha(_) => joint_rows::rows(joint, &self.ends),
-            Integrator::EnergyMomentum => joint_rows::mean_rows(joint, &self.starts, &self.ends),
+            Integrator::SymplecticEuler => self.kkt.rows[j],
+            Integrator::GeneralizedAlpha(_) => joint_rows::rows(joint, &self.trial.ends),
+            Integrator::EnergyMomentum => joint_rows::mean_rows(joint, &self.start.bodies, &self.trial.ends),
         };
         let (at, rigid, free) = (self.kkt.joint_at[j], joint.rigid(), joint.free_row());
         let mut sum = [V3::zeros(); 2];
@@ -39,7 +39,7 @@ impl Dynamics {
             let force = if free == Some(r) {
                 axis / self.h
             } else if rigid[r] {
-                -self.solution[at + r] / self.impulse_per_force()
+                -self.trial.solution[at + r] / self.impulse_per_force()
             } else {
                 continue;
             };

@@ -10,6 +10,9 @@
 //! and equilibrium M·v̇⁺ + gyroscopic terms = f⁺ + J⁺ᵀλ⁺ at the end. As function of u this is M(u − …) = θ·h·f⁺
 //! with θ = β(1 − α_f)/(1 − α_m): the matrix of the first-order step serves both, forces alone weigh θ.
 
+use crate::math::{M3, V3};
+use crate::motion::Motion;
+
 /// Six rates or accelerations of a body: centre of mass, rotation; world axes.
 pub(crate) type Six = [f64; 6];
 
@@ -106,35 +109,28 @@ impl Weights {
     }
 }
 
+/// Where a body ends.
+pub(super) struct BodyEnd {
+    pub motion: Motion,
+    /// Rotation vector of the step before the Cayley transform.
+    pub turn: V3,
+    pub acceleration: Acceleration,
+}
+
+/// Rates of a motion.
+pub(super) fn rates(m: &Motion) -> Six {
+    [m.v.x, m.v.y, m.v.z, m.w.x, m.w.y, m.w.z]
+}
+
+/// I·ω̇ + ω × I·ω in world axes.
+pub(super) fn inertial_moment(inertia: &M3, m: &Motion, acceleration: &V3) -> V3 {
+    let local = |v: &V3| m.q.inverse_transform_vector(v);
+    let w = local(&m.w);
+    m.q * (inertia * local(acceleration) + w.cross(&(inertia * w)))
+}
+
 terraglue_subsystem::persist!(Acceleration { algorithmic, real });
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// An oscillator x¨ = −x; the error of the position at t = 1.
-    fn oscillator(rho: f64, h: f64) -> f64 {
-        let w = Weights::new(rho);
-        let (mut x, mut v) = (1.0, [0.0; 6]);
-        let mut a = Acceleration { algorithmic: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], ..Acceleration::default() };
-        a.real = a.algorithmic;
-        for _ in 0..(1.0 / h).round() as usize {
-            let mut u = Weights::predict(&v, &a, h);
-            let (_, end) = w.end(&u, &v, &a, h);
-            // θh(−x⁺ − v̇⁺) = 0 with dv̇⁺/du = 1/(θh).
-            let residual = w.theta() * h * (-(x + h * u[0]) - end.real[0]);
-            u[0] += residual / (1.0 + w.theta() * h * h);
-            let (rate, end) = w.end(&u, &v, &a, h);
-            (x, v, a) = (x + h * u[0], rate, end);
-        }
-        (x - libm::cos(1.0)).abs()
-    }
-
-    #[test]
-    fn an_oscillator_converges_with_second_order() {
-        for rho in [0.0, 0.8, 1.0] {
-            let order = libm::log2(oscillator(rho, 1e-2) / oscillator(rho, 5e-3));
-            assert!((1.9..2.1).contains(&order), "{rho}: {order}");
-        }
-    }
-}
+#[path = "../../tests/unit/scheme.rs"]
+mod tests;

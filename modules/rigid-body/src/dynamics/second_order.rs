@@ -4,11 +4,10 @@
 //! the matrix leaves out (gyroscopic terms, turning of the rows under load) costs iterations, not accuracy. Joints
 //! are closed on the level of positions. The two rules are [`super::alpha`] and [`super::midpoint`].
 
-use super::scheme::{Integrator, Six, Weights};
-use super::{AxisResult, Dynamics, Failure};
+use super::scheme::{Integrator, Six, Weights, rates};
+use super::{AxisResult, Dynamics, Failure, alpha, midpoint};
 use crate::dynamics::joint_rows::{coordinate, gap, mean_rows, rows};
-use crate::math::V3;
-use crate::state::{Motion, State};
+use crate::state::State;
 
 /// Most corrections of a step.
 const MAX_CORRECTIONS: usize = 60;
@@ -23,43 +22,33 @@ const RATE_CHANGE: f64 = 1e-11;
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Rates below this are rest, m/s and rad/s.
 const REST: f64 = 1e-14;
-/// Rates of a motion.
-pub(super) fn rates(m: &Motion) -> Six {
-    [m.v.x, m.v.y, m.v.z, m.w.x, m.w.y, m.w.z]
-}
 
 impl Dynamics {
     /// Linearises about the motion with unchanged accelerations.
     pub(super) fn prepare_second_order(&mut self, state: &State) -> Result<(), Failure> {
-        self.start_accelerations.clone_from(&state.accelerations);
-        self.angles.clear();
-        self.angles.extend(state.joints.iter().map(|j| j.angle));
-        self.loads.clone_from(&state.loads);
+        self.start.accelerations.clone_from(&state.accelerations);
+        self.start.loads.clone_from(&state.loads);
         if !state.accelerated && self.integrator != Integrator::EnergyMomentum {
             self.external.fill(0.0);
             self.accelerate(state)?;
         }
-        for b in 0..self.starts.len() {
+        for b in 0..self.start.bodies.len() {
             let at = self.kkt.body_at[b];
-            let u = Weights::predict(&rates(&self.starts[b]), &self.start_accelerations[b], self.h);
-            self.free[at..at + 6].copy_from_slice(&u);
+            let u = Weights::predict(&rates(&self.start.bodies[b]), &self.start.accelerations[b], self.h);
+            self.start.free[at..at + 6].copy_from_slice(&u);
         }
-        self.solution.copy_from_slice(&self.free);
+        self.trial.solution.copy_from_slice(&self.start.free);
         self.find_ends_second_order();
-        for b in 0..self.ends.len() {
-            let r = self.ends[b].q.to_rotation_matrix();
-            self.inertia[b] = r * self.model.bodies[b].inertia * r.transpose();
+        for b in 0..self.trial.ends.len() {
+            self.kkt.turn_inertia(b, &self.model.bodies[b], &self.trial.ends[b].q);
         }
         let span = self.span(state, self.h, self.integrator.force_time());
         for (j, joint) in self.model.joints.iter().enumerate() {
-            let s = &state.joints[j];
-            self.broken[j] = s.broken;
-            self.rows[j] = match self.integrator {
-                Integrator::EnergyMomentum => mean_rows(joint, &self.starts, &self.ends),
-                _ => rows(joint, &self.ends),
+            self.kkt.rows[j] = match self.integrator {
+                Integrator::EnergyMomentum => mean_rows(joint, &self.start.bodies, &self.trial.ends),
+                _ => rows(joint, &self.trial.ends),
             };
-            self.axes[j].renew(s, joint.limits, &span);
-            self.modes[j] = self.axes[j].start(s.mode);
+            self.branches.renew(j, joint, &state.joints[j], &span);
         }
         self.prepare_closures(state);
         Ok(())
@@ -67,19 +56,20 @@ impl Dynamics {
 
     /// Corrects the mean rates until forces balance and joints are closed on the present branches.
     pub(super) fn solve_branch_second_order(&mut self) -> Result<(), Failure> {
-        self.solution.copy_from_slice(&self.free);
-        let noise = self.noise();
+        self.trial.solution.copy_from_slice(&self.start.free);
+        let noise = noise(self);
         let (mut least, mut last, mut mixed) = (f64::INFINITY, f64::INFINITY, None);
         for round in 0..MAX_CORRECTIONS {
             self.find_ends_second_order();
             self.residual_second_order();
             self.kkt.solver.substitute(&mut self.correction);
             if let Some(rounds) = &mut mixed {
-                self.anderson.mix(*rounds, &self.solution, &mut self.correction);
+                self.anderson.mix(*rounds, &self.trial.solution, &mut self.correction);
                 *rounds += 1;
             }
-            self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
-            let (change, rates) = (self.largest(&self.correction), self.largest(&self.solution));
+            self.trial.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
+            let unknowns = 6 * self.start.bodies.len();
+            let [change, rates] = [&self.correction, &self.trial.solution].map(|x| largest(&x[..unknowns]));
             if (0..2).all(|k| change[k] <= RATE_CHANGE * rates[k] + noise) {
                 self.find_ends_second_order();
                 return self.check_gaps();
@@ -92,7 +82,7 @@ impl Dynamics {
             if mixed.is_none() && (share > last || round >= PLAIN) {
                 mixed = Some(0);
                 if share > STALLED {
-                    self.solution.copy_from_slice(&self.free);
+                    self.trial.solution.copy_from_slice(&self.start.free);
                 }
             }
             (least, last) = (least.min(share), share);
@@ -100,42 +90,36 @@ impl Dynamics {
         Err(Failure::NotConverged { corrections: MAX_CORRECTIONS })
     }
 
-    /// To what rates of jointed bodies can be told, m/s and rad/s.
-    fn noise(&self) -> f64 {
-        let jointed = self.model.joints.iter().flat_map(|j| [Some(j.child), j.parent]).flatten();
-        let looped = (0..self.starts.len()).filter(|_| self.closes());
-        let far = jointed.chain(looped).fold(0.0_f64, |m, b| m.max(1.0).max(self.starts[b].c.amax()));
-        ROUNDING * far / self.h + REST
-    }
-
-    /// Largest translation and largest rotation among the unknowns of the bodies.
-    fn largest(&self, x: &[f64]) -> [f64; 2] {
-        x[..6 * self.starts.len()].chunks_exact(6).fold([0.0_f64; 2], |m, v| {
-            let most = |k: usize| v[k..k + 3].iter().fold(m[k / 3], |m, v| m.max(v.abs()));
-            [most(0), most(3)]
-        })
-    }
-
     /// The free axis of a joint.
     pub(super) fn axis_result_second_order(&self, j: usize, free: usize) -> AxisResult {
         let joint = &self.model.joints[j];
         let rate = self.travel(j) / self.h;
-        let rows = rows(joint, &self.ends);
-        let child = rates(&self.ends[joint.child]);
-        let parent = joint.parent.map(|p| rates(&self.ends[p]));
+        let rows = rows(joint, &self.trial.ends);
+        let child = rates(&self.trial.ends[joint.child]);
+        let parent = joint.parent.map(|p| rates(&self.trial.ends[p]));
         let end_rate = rows.rates(&child, parent.as_ref().map(|p| p.as_slice()))[free];
         AxisResult { rate, end_rate, mean_rate: rate, impulse: self.impulse_of(j, free) }
     }
 
     /// Change of the coordinate of joint j in the trial.
     pub(super) fn travel(&self, j: usize) -> f64 {
-        coordinate(&self.model.joints[j], &self.ends, self.angles[j]) - self.angles[j]
+        coordinate(&self.model.joints[j], &self.trial.ends, self.start.angles[j]) - self.start.angles[j]
     }
 
+    /// Poses, rates and accelerations at the end for the mean rates of the trial.
     pub(super) fn find_ends_second_order(&mut self) {
-        match self.integrator {
-            Integrator::EnergyMomentum => self.find_ends_midpoint(),
-            _ => self.find_ends_alpha(),
+        for b in 0..self.trial.ends.len() {
+            let (start, at) = (&self.start.bodies[b], self.kkt.body_at[b]);
+            let u = &self.trial.solution[at..at + 6];
+            let end = match &self.integrator {
+                Integrator::SymplecticEuler => return,
+                Integrator::GeneralizedAlpha(weights) => {
+                    alpha::end(weights, start, &self.start.accelerations[b], u, self.h)
+                }
+                Integrator::EnergyMomentum => midpoint::end(start, u, self.h),
+            };
+            (self.trial.ends[b], self.trial.turns[b]) = (end.motion, end.turn);
+            self.trial.accelerations[b] = end.acceleration;
         }
     }
 
@@ -144,55 +128,83 @@ impl Dynamics {
         let weight = self.integrator.force_weight();
         let midpoint = self.integrator == Integrator::EnergyMomentum;
         self.correction.copy_from_slice(&self.external);
-        self.turn_carried();
-        for b in 0..self.ends.len() {
-            if midpoint {
-                self.equilibrium_midpoint(b);
-            } else {
-                self.equilibrium_alpha(b);
-            }
+        for carried in &self.carried {
+            let moment = carried.turned(&self.integrator, &self.trial.turns);
+            let at = self.kkt.body_at[carried.body] + 3;
+            self.correction[at..at + 3].iter_mut().zip(&moment).for_each(|(c, m)| *c += m);
+        }
+        for b in 0..self.trial.ends.len() {
+            let (missing, at) = (equilibrium(self, b), self.kkt.body_at[b]);
+            self.correction[at..at + 6].iter_mut().zip(missing).for_each(|(c, m)| *c += m);
         }
         for (j, joint) in self.model.joints.iter().enumerate() {
-            if self.broken[j] {
+            if self.branches.broken[j] {
                 continue;
             }
             let at = self.kkt.joint_at[j];
-            let open = gap(joint, &self.ends);
-            let here =
-                if midpoint { mean_rows(joint, &self.starts, &self.ends) } else { rows(joint, &self.ends) };
+            let open = gap(joint, &self.trial.ends);
+            let here = if midpoint {
+                mean_rows(joint, &self.start.bodies, &self.trial.ends)
+            } else {
+                rows(joint, &self.trial.ends)
+            };
             let (free, rigid) = (joint.free_row(), joint.rigid());
             for r in (0..6).filter(|r| rigid[*r] || free == Some(*r)) {
-                let mut impulse = -self.solution[at + r];
+                let mut impulse = -self.trial.solution[at + r];
                 if free == Some(r) {
-                    match self.axes[j].row(self.modes[j]) {
+                    match self.branches.row(j) {
                         Some((c, b)) => {
                             self.correction[at + r] = b - self.travel(j) / self.h - c / weight * impulse;
                         }
-                        None => impulse = weight * self.axes[j].impulse(self.modes[j]),
+                        None => impulse = weight * self.branches.impulse(j),
                     }
                 } else {
                     self.correction[at + r] = -open[r] / self.h;
                 }
-                if impulse == 0.0 {
-                    continue;
-                }
-                add(&mut self.correction, self.kkt.body_at[joint.child], impulse, &here.on_child(r));
-                if let Some(parent) = joint.parent {
-                    add(&mut self.correction, self.kkt.body_at[parent], impulse, &here.on_parent(r));
+                if impulse != 0.0 {
+                    self.kkt.push(&mut self.correction, joint, &here, r, impulse);
                 }
             }
         }
-        self.closures_second_order();
+        self.closing.miss_into(
+            &self.model,
+            &self.start,
+            &self.trial,
+            &self.kkt,
+            (self.h, &self.integrator),
+            &mut self.correction,
+        );
     }
 }
 
-/// I·ω̇ + ω × I·ω in world axes.
-pub(super) fn inertial_moment(inertia: &crate::math::M3, m: &Motion, acceleration: &V3) -> V3 {
-    let local = |v: &V3| m.q.inverse_transform_vector(v);
-    let w = local(&m.w);
-    m.q * (inertia * local(acceleration) + w.cross(&(inertia * w)))
+/// To what rates of jointed bodies can be told, m/s and rad/s.
+fn noise(dynamics: &Dynamics) -> f64 {
+    let jointed = dynamics.model.joints.iter().flat_map(|j| [Some(j.child), j.parent]).flatten();
+    let looped = (0..dynamics.start.bodies.len()).filter(|_| dynamics.closing.any());
+    let far = jointed.chain(looped).fold(0.0_f64, |m, b| m.max(1.0).max(dynamics.start.bodies[b].c.amax()));
+    ROUNDING * far / dynamics.h + REST
 }
 
-pub(super) fn add(x: &mut [f64], at: usize, impulse: f64, row: &Six) {
-    x[at..at + 6].iter_mut().zip(row).for_each(|(x, r)| *x += impulse * r);
+/// What is missing to the equilibrium of body b at the end of the trial.
+fn equilibrium(dynamics: &Dynamics, b: usize) -> Six {
+    let (body, gravity, load) =
+        (&dynamics.model.bodies[b], &dynamics.model.gravity, &dynamics.start.loads[b]);
+    let end = &dynamics.trial.ends[b];
+    match &dynamics.integrator {
+        Integrator::EnergyMomentum => {
+            midpoint::equilibrium(body, gravity, load, (&dynamics.start.bodies[b], end), dynamics.h)
+        }
+        Integrator::SymplecticEuler | Integrator::GeneralizedAlpha(_) => {
+            let real = &dynamics.trial.accelerations[b].real;
+            alpha::equilibrium(body, gravity, load, (end, real), dynamics.impulse_per_force())
+        }
+    }
+}
+
+/// Largest translation and largest rotation among rates of bodies.
+fn largest(rates: &[f64]) -> [f64; 2] {
+    rates.chunks_exact(6).fold([0.0_f64; 2], |m, v| {
+        let most = |k: usize| v[k..k + 3].iter().fold(m[k / 3], |m, v| m.max(v.abs()));
+        [most(0), most(3)]
+    })
 }

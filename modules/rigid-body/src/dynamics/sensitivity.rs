@@ -28,103 +28,99 @@ pub(crate) struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// The trial that it was begun with.
-    pub fn trial(&self) -> &[f64] {
-        &self.trial
-    }
-
     /// The load, all zero before.
     pub fn load(&mut self) -> &mut [f64] {
         self.load.fill(0.0);
         &mut self.load
     }
-}
 
-impl Dynamics {
-    /// Remembers the trial at hand; to be called before [`Dynamics::answer`].
-    pub fn begin_answers(&mut self, s: &mut Sensitivity) {
-        s.trial.clone_from(&self.solution);
-        s.load.resize(self.solution.len(), 0.0);
-        self.find_ends_of_trial();
-        self.residual_of_trial();
-        s.residual.clone_from(&self.correction);
+    /// Remembers the trial at hand; to be called before [`Sensitivity::answer`].
+    pub fn begin(&mut self, dynamics: &mut Dynamics) {
+        self.trial.clone_from(&dynamics.trial.solution);
+        self.load.resize(dynamics.trial.solution.len(), 0.0);
+        find_ends(dynamics);
+        find_residual(dynamics);
+        self.residual.clone_from(&dynamics.correction);
     }
 
     /// Gives the trial a small share ε of its answer to the load, so that all that follows from it can be differenced: ε,
     /// or none where nothing moves.
-    pub fn answer(&mut self, s: &mut Sensitivity) -> Option<f64> {
-        s.change.clone_from(&s.load);
-        self.kkt.solver.substitute(&mut s.change);
+    pub fn answer(&mut self, dynamics: &mut Dynamics) -> Option<f64> {
+        self.change.clone_from(&self.load);
+        dynamics.kkt.solver.substitute(&mut self.change);
+        let rates = 6 * dynamics.start.bodies.len();
         let mut left = 1.0;
         for _ in 0..MAX_REFINEMENTS {
-            let epsilon = self.put(s)?;
-            self.residual_of_trial();
-            let second = self.integrator.is_second_order();
-            for ((c, r), load) in self.correction.iter_mut().zip(&s.residual).zip(&s.load) {
+            let epsilon = self.put(dynamics)?;
+            find_residual(dynamics);
+            let second = dynamics.integrator.is_second_order();
+            for ((c, r), load) in dynamics.correction.iter_mut().zip(&self.residual).zip(&self.load) {
                 // in first order all rows but those of places are linear, and the factor's own
                 *c = (*c - r) / epsilon + if second { *load } else { 0.0 };
             }
-            self.kkt.solver.substitute(&mut self.correction);
-            let now = self.size(&self.correction) / self.size(&s.change);
+            dynamics.kkt.solver.substitute(&mut dynamics.correction);
+            let now = largest(&dynamics.correction[..rates]) / largest(&self.change[..rates]);
             // A step that turns bodies so far that this does not end keeps what it has.
             if !(now < left) {
                 break;
             }
-            s.change.iter_mut().zip(&self.correction).for_each(|(y, c)| *y += c);
+            self.change.iter_mut().zip(&dynamics.correction).for_each(|(y, c)| *y += c);
             if now * now <= EXACT * left {
                 break;
             }
             left = now;
         }
-        self.put(s)
+        self.put(dynamics)
     }
 
-    /// Whether the trial ends within this distance (m or rad) of that of these unknowns.
-    pub fn ends_near(&self, other: &[f64], distance: f64) -> bool {
-        let bodies = 6 * self.starts.len();
-        let far = |(a, b): (&f64, &f64)| !((a - b).abs() * self.h <= distance);
-        other.len() == self.solution.len() && !self.solution.iter().zip(other).take(bodies).any(far)
+    /// Whether the trial at hand ends within this distance (m or rad) of the one that was remembered.
+    pub fn is_near(&self, dynamics: &Dynamics, distance: f64) -> bool {
+        let (now, rates) = (&dynamics.trial.solution, 6 * dynamics.start.bodies.len());
+        let far = |(a, b): (&f64, &f64)| !((a - b).abs() * dynamics.h <= distance);
+        self.trial.len() == now.len() && !now.iter().zip(&self.trial).take(rates).any(far)
     }
 
     /// Back to the trial.
-    pub fn end_answers(&mut self, s: &Sensitivity) {
-        self.solution.copy_from_slice(&s.trial);
-        self.find_ends_of_trial();
-    }
-
-    /// Largest rate in a vector of unknowns.
-    fn size(&self, x: &[f64]) -> f64 {
-        x[..6 * self.starts.len()].iter().fold(0.0, |m, v| m.max(v.abs()))
+    pub fn end(&self, dynamics: &mut Dynamics) {
+        dynamics.trial.solution.copy_from_slice(&self.trial);
+        find_ends(dynamics);
     }
 
     /// The trial with a share of the change, as large as the differences want it.
-    fn put(&mut self, s: &Sensitivity) -> Option<f64> {
-        let size = self.size(&s.change);
+    fn put(&self, dynamics: &mut Dynamics) -> Option<f64> {
+        let size = largest(&self.change[..6 * dynamics.start.bodies.len()]);
         if !(size > 0.0 && size.is_finite()) {
             return None;
         }
-        let epsilon = MOVE / (self.h * size);
-        for ((u, trial), y) in self.solution.iter_mut().zip(&s.trial).zip(&s.change) {
+        let epsilon = MOVE / (dynamics.h * size);
+        for ((u, trial), y) in dynamics.trial.solution.iter_mut().zip(&self.trial).zip(&self.change) {
             *u = trial + epsilon * y;
         }
-        self.find_ends_of_trial();
+        find_ends(dynamics);
         Some(epsilon)
     }
+}
 
-    fn find_ends_of_trial(&mut self) {
-        if self.integrator.is_second_order() {
-            self.find_ends_second_order();
-        } else {
-            self.find_ends();
-        }
+/// Largest of some rates.
+fn largest(rates: &[f64]) -> f64 {
+    rates.iter().fold(0.0, |m, v| m.max(v.abs()))
+}
+
+/// Motion at the end for the unknowns of the trial.
+fn find_ends(dynamics: &mut Dynamics) {
+    if dynamics.integrator.is_second_order() {
+        dynamics.find_ends_second_order();
+    } else {
+        dynamics.trial.find_places(&dynamics.kkt, &dynamics.start, dynamics.h);
+        (0..dynamics.trial.ends.len()).for_each(|b| dynamics.find_rates(b));
     }
+}
 
-    /// What is missing to the conditions of the step, into `correction`.
-    fn residual_of_trial(&mut self) {
-        if self.integrator.is_second_order() {
-            self.residual_second_order();
-        } else {
-            self.gaps_into_correction();
-        }
+/// What is missing to the conditions of the step, into `correction`.
+fn find_residual(dynamics: &mut Dynamics) {
+    if dynamics.integrator.is_second_order() {
+        dynamics.residual_second_order();
+    } else {
+        dynamics.gaps_into_correction();
     }
 }

@@ -8,42 +8,40 @@
 use super::{Dynamics, Failure};
 use crate::math::V3;
 
-impl Dynamics {
-    /// Tells of a joint that stays open whether the step is beyond that limit; `solution` holds the step on its branches
-    /// before joints are closed.
-    pub(super) fn explained(&self, failure: Failure) -> Failure {
-        let Failure::Gap { joint, gap } = failure else { return failure };
-        let load = |b: usize| self.load_of(b);
-        let longest = |b: usize| 2.0 * (largest_inertia(&self.model.bodies[b].inertia) / load(b).0).sqrt();
-        let worst = (0..self.model.bodies.len()).min_by(|a, b| longest(*a).total_cmp(&longest(*b)));
-        match worst.map(|b| (b, longest(b))).filter(|(_, longest)| *longest < self.h) {
-            None => Failure::Gap { joint, gap },
-            Some((b, longest)) => {
-                let body = &self.model.bodies[b];
-                let (link, mass, force) = (body.name.clone(), body.mass, load(b).1);
-                Failure::Swinging { joint, gap, force, link, mass, h: self.h, longest: 0.5 * longest }
-            }
+/// Tells of a joint that stays open whether the step is beyond that limit; the solution of the trial is the step on its branches
+/// before joints are closed.
+pub(super) fn explained(dynamics: &Dynamics, failure: Failure) -> Failure {
+    let Failure::Gap { joint, gap } = failure else { return failure };
+    let load = |b: usize| load_of(dynamics, b);
+    let bodies = &dynamics.model.bodies;
+    let longest = |b: usize| 2.0 * (largest_inertia(&bodies[b].inertia) / load(b).0).sqrt();
+    let worst = (0..bodies.len()).min_by(|a, b| longest(*a).total_cmp(&longest(*b)));
+    match worst.map(|b| (b, longest(b))).filter(|(_, longest)| *longest < dynamics.h) {
+        None => Failure::Gap { joint, gap },
+        Some((b, longest)) => {
+            let (link, mass, force) = (bodies[b].name.clone(), bodies[b].mass, load(b).1);
+            Failure::Swinging { joint, gap, force, link, mass, h: dynamics.h, longest: 0.5 * longest }
         }
     }
+}
 
-    /// Sum of force times arm over the joints of a body, N m, and the largest of the forces, N.
-    fn load_of(&self, body: usize) -> (f64, f64) {
-        let mut sum = (0.0, 0.0_f64);
-        for (j, joint) in self.model.joints.iter().enumerate().filter(|(j, _)| !self.broken[*j]) {
-            let arm = match body {
-                b if b == joint.child => joint.child_anchor,
-                b if joint.parent == Some(b) => joint.parent_anchor,
-                _ => continue,
-            };
-            let rigid = joint.rigid();
-            let at = self.kkt.joint_at[j];
-            let row =
-                |r: usize| if rigid[r] { self.solution[at + r] / self.impulse_per_force() } else { 0.0 };
-            let force = V3::new(row(0), row(1), row(2)).norm();
-            sum = (sum.0 + force * arm.norm(), sum.1.max(force));
-        }
-        sum
+/// Sum of force times arm over the joints of a body, N m, and the largest of the forces, N.
+fn load_of(dynamics: &Dynamics, body: usize) -> (f64, f64) {
+    let mut sum = (0.0, 0.0_f64);
+    let joints = dynamics.model.joints.iter().enumerate();
+    for (j, joint) in joints.filter(|(j, _)| !dynamics.branches.broken[*j]) {
+        let arm = match body {
+            b if b == joint.child => joint.child_anchor,
+            b if joint.parent == Some(b) => joint.parent_anchor,
+            _ => continue,
+        };
+        let rigid = joint.rigid();
+        let impulses = &dynamics.trial.solution[dynamics.kkt.joint_at[j]..];
+        let row = |r: usize| if rigid[r] { impulses[r] / dynamics.impulse_per_force() } else { 0.0 };
+        let force = V3::new(row(0), row(1), row(2)).norm();
+        sum = (sum.0 + force * arm.norm(), sum.1.max(force));
     }
+    sum
 }
 
 fn largest_inertia(inertia: &crate::math::M3) -> f64 {

@@ -5,7 +5,7 @@ use crate::compaction::{Compaction, SavedCompaction};
 use crate::displacement::Site;
 use crate::feet::Foot;
 use crate::sweep::{Counts, ROUND, SavedActiveSet, Sweeper};
-use crate::values;
+use crate::values::variables;
 use std::sync::Arc;
 use terraglue_ground::{Lattice, UNIT_M};
 use terraglue_soil_contact::{Covered, Ground, Material};
@@ -277,11 +277,26 @@ impl Material for Automaton {
     }
 
     fn variables(&self, first: u32) -> Vec<Variable> {
-        values::variables(first)
+        variables(first)
     }
 
     fn value(&self, k: u32, ground: &Ground) -> f64 {
-        values::value(self, k, ground)
+        let counts = self.counts();
+        let spacing = ground.heights.lattice().spacing;
+        match k {
+            0 => self.active_nodes() as f64,
+            1 => counts.visited as f64,
+            2 => f64::from(counts.sweeps),
+            3 => counts.gained as f64,
+            4 => counts.gained as f64 / (counts.moved.max(1)) as f64,
+            5 => counts.moved as f64 * UNIT_M * spacing * spacing,
+            6 => self.settings.curvature_max,
+            7 => self.repose(),
+            8 => self.settings.sweeps_per_step.unwrap_or(0.0),
+            9 => self.settings.compacted_fraction,
+            10 => self.compaction.total() as f64 * UNIT_M * spacing * spacing,
+            _ => f64::NAN,
+        }
     }
 
     fn set_value(&mut self, k: u32, value: f64) -> Result {

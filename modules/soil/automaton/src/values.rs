@@ -1,8 +1,5 @@
-//! The automaton's own variables.
+//! The list of the automaton's own variables.
 
-use crate::automaton::Automaton;
-use terraglue_ground::UNIT_M;
-use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Causality, Variable};
 
 /// The variables, numbered from `first`.
@@ -33,24 +30,4 @@ pub fn variables(first: u32) -> Vec<Variable> {
         live(9, "compacted_fraction", "", "share of the pressed volume that becomes denser").within(0.0, 1.0),
         out(10, "compacted_volume", "m^3", "volume that became denser under feet since the start"),
     ]
-}
-
-/// Value of variable k.
-pub fn value(automaton: &Automaton, k: u32, ground: &Ground) -> f64 {
-    let counts = automaton.counts();
-    let spacing = ground.heights.lattice().spacing;
-    match k {
-        0 => automaton.active_nodes() as f64,
-        1 => counts.visited as f64,
-        2 => f64::from(counts.sweeps),
-        3 => counts.gained as f64,
-        4 => counts.gained as f64 / (counts.moved.max(1)) as f64,
-        5 => counts.moved as f64 * UNIT_M * spacing * spacing,
-        6 => automaton.settings().curvature_max,
-        7 => automaton.repose(),
-        8 => automaton.settings().sweeps_per_step.unwrap_or(0.0),
-        9 => automaton.settings().compacted_fraction,
-        10 => automaton.compaction().total() as f64 * UNIT_M * spacing * spacing,
-        _ => f64::NAN,
-    }
 }

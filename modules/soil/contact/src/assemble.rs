@@ -2,14 +2,11 @@
 
 use crate::bound::Bound;
 use crate::patch::{Local, Patches};
-use crate::patch_nodes::Facing;
-use crate::vectors::{displacement, dot};
+use crate::patch_nodes::{Facing, PatchNodes};
+use crate::vectors::{Stiffness, displacement, dot};
 use crate::wall;
 use terraglue_soil_law::ShearResponse;
 use terraglue_subsystem::Result;
-
-/// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
-pub type Stiffness = [[f64; 6]; 6];
 
 /// What the laws answered at the nodes of the patches in one motion of their feet, for the stiffness there: it needs no
 /// second look at the laws.
@@ -49,7 +46,7 @@ impl Patches {
     pub fn law_wrench(&self, p: usize, x: &[f64; 6]) -> Result<[f64; 6]> {
         let mut sum = [0.0; 6];
         self.each_answer(p, x, |k, pressure, _, r| {
-            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
+            add_force(&mut sum, self.nodes.arm[k], self.nodes.force(k, pressure, r.stress));
         })?;
         self.add_beside(p, x, &mut sum);
         Ok(sum)
@@ -74,7 +71,7 @@ impl Patches {
     pub fn noted_wrench(&self, p: usize, x: &[f64; 6], noted: &mut Noted) -> Result<[f64; 6]> {
         let mut sum = [0.0; 6];
         self.each_answer(p, x, |k, pressure, slope, r| {
-            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
+            add_force(&mut sum, self.nodes.arm[k], self.nodes.force(k, pressure, r.stress));
             noted.nodes.push((k, slope, *r));
         })?;
         self.add_beside(p, x, &mut sum);
@@ -112,7 +109,7 @@ impl Patches {
             // what the shear and the way of the last step change in what the soil bears belongs to the step that begins
             let committed = n.stamp[k] != 0 && n.before[k] > 0.0 && pressure > 0.0;
             let now = if committed { n.before[k] } else { pressure };
-            add_force(&mut sum, n.arm[k], self.node_force(k, now, r.stress));
+            add_force(&mut sum, n.arm[k], self.nodes.force(k, now, r.stress));
             let inclined = n.area[k] * n.facing[k].stretch;
             let shear = &self.law(k).shear;
             // soil that clings under tension holds nothing along the underside
@@ -131,19 +128,6 @@ impl Patches {
         Ok((sum, strength + bound.take(&self.laws)?))
     }
 
-    /// Force of a node on the body along n, t1, t2 under a pressure and a shear stress.
-    #[inline]
-    pub fn node_force(&self, k: usize, pressure: f64, tau: [f64; 2]) -> [f64; 3] {
-        let n = &self.nodes;
-        let facing = &n.facing[k];
-        let area = n.area[k];
-        let inclined = area * facing.stretch;
-        std::array::from_fn(|c| {
-            area * pressure * facing.press[c]
-                - inclined * (tau[0] * facing.along[0][c] + tau[1] * facing.along[1][c])
-        })
-    }
-
     /// Force of patch `p` on the body along n at `x`, N, and by how much it falls with X_n, N/m.
     ///
     /// # Errors
@@ -151,7 +135,7 @@ impl Patches {
     pub fn normal_force(&self, p: usize, x: &[f64; 6]) -> Result<[f64; 2]> {
         let (n, mut sum, mut stiffness) = (&self.nodes, [0.0; 6], 0.0);
         self.each_answer(p, x, |k, pressure, slope, r| {
-            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, r.stress));
+            add_force(&mut sum, n.arm[k], self.nodes.force(k, pressure, r.stress));
             stiffness += node_slope(&n.facing[k], n.area[k], slope, r, [0, 0]);
         })?;
         self.add_beside(p, x, &mut sum);
@@ -172,7 +156,7 @@ impl Patches {
     pub fn stiffness(&self, p: usize, x: &[f64; 6]) -> Result<Stiffness> {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
-        self.each_answer(p, x, |k, _, slope, r| self.stiffen(k, slope, r, moments, &mut sum))?;
+        self.each_answer(p, x, |k, _, slope, r| stiffen(&self.nodes, k, slope, r, moments, &mut sum))?;
         self.stiffen_beside(p, x, &mut sum);
         if let Some(cone) = &self.ports[p].cone {
             cone.stiffen(x, self.law_wrench(p, x)?[0], &mut sum);
@@ -185,19 +169,12 @@ impl Patches {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
         let (nodes, force) = noted.of(p);
-        nodes.iter().for_each(|(k, slope, r)| self.stiffen(*k, *slope, r, moments, &mut sum));
+        nodes.iter().for_each(|(k, slope, r)| stiffen(&self.nodes, *k, *slope, r, moments, &mut sum));
         self.stiffen_beside(p, x, &mut sum);
         if let Some(cone) = &self.ports[p].cone {
             cone.stiffen(x, force, &mut sum);
         }
         sum
-    }
-
-    /// Adds the stiffness of node k.
-    #[inline]
-    fn stiffen(&self, k: usize, slope: f64, r: &ShearResponse, moments: bool, sum: &mut Stiffness) {
-        let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, r);
-        add_stiffness(sum, self.nodes.arm[k], &node, moments);
     }
 
     /// Adds the stiffness of the soil beside patch `p`.
@@ -299,6 +276,13 @@ pub fn node_stiffness(facing: &Facing, area: f64, slope: f64, r: &ShearResponse)
         }
     }
     stiffness
+}
+
+/// Adds the stiffness of node k.
+#[inline]
+fn stiffen(nodes: &PatchNodes, k: usize, slope: f64, r: &ShearResponse, moments: bool, sum: &mut Stiffness) {
+    let node = node_stiffness(&nodes.facing[k], nodes.area[k], slope, r);
+    add_stiffness(sum, nodes.arm[k], &node, moments);
 }
 
 /// One entry of [`node_stiffness`].

@@ -42,6 +42,13 @@ pub struct EnergyLedger {
 }
 
 impl EnergyLedger {
+    /// Takes in what happened under one foot.
+    fn take(&mut self, turnover: &Turnover) {
+        self.port_work += turnover.work;
+        self.dissipated += turnover.heat;
+        self.owed += turnover.entered;
+    }
+
     /// Takes `due` (J) of energy that the soil has taken up beside the flow of its nodes out of the heat that was made since it
     /// was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: what the material is lifted by, and the
     /// elastic energy of soil that a foot slides onto, which is loaded a node at a time, while what drives the foot works
@@ -165,7 +172,7 @@ impl Scene<'_> {
                     n,
                     ground.heights.lattice().spacing,
                 );
-                touch.under(patch, &wrench, &x, self.h);
+                touch.under(patch.wheel.as_ref(), &wrench, &x, self.h);
                 ground.contacts.tell(port.key, &touch);
             }
             if loaded > 0 {
@@ -209,8 +216,7 @@ impl Scene<'_> {
         touch: &mut Touch,
     ) -> Result<u32> {
         let n = &self.patches.nodes;
-        let first = lists.loaded.len();
-        let mut loaded = 0;
+        let (first, mut loaded) = (lists.loaded.len(), 0);
         let mut turnover = Turnover::default();
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
@@ -218,11 +224,7 @@ impl Scene<'_> {
             let curve = &self.patches.law(k).curve;
             let mut kept = KeptContact::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
-            let pressure = match (curve.keeper(), asked) {
-                (Some(_), _) => self.kept(k, depth, &mut kept)?,
-                (None, Some((pressure, _))) => pressure,
-                (None, None) => self.patches.pressure(k, depth)?.0,
-            };
+            let pressure = self.pressure(k, depth, asked.map(|(pressure, _)| pressure), &mut kept)?;
             let [i, j] = n.index[k];
             let (mut covered, deep) = covered(n, k, [depth, pressure], patch.slope);
             if pressure > 0.0 {
@@ -231,7 +233,7 @@ impl Scene<'_> {
                 touch.add(n, k, pressure, deep);
                 let slip = facing.slide(moved);
                 let shear = asked.map_or_else(|| self.sheared(k, pressure, slip), |(_, shear)| Ok(shear))?;
-                let force = self.patches.node_force(k, pressure, shear.stress);
+                let force = n.force(k, pressure, shear.stress);
                 turnover.work -= dot(force, moved);
                 let node = Pressed { k, depth, pressure, slip, shear, kept: &kept };
                 let (slid, surface) = self.press(patch, &node, ground, ledger, &mut turnover);
@@ -243,7 +245,7 @@ impl Scene<'_> {
                 covered.virgin = if kept_by_law(curve) { pressure } else { self.patches.yields(k, depth)?.0 };
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
-                turnover.work -= dot(self.patches.node_force(k, pressure, [0.0; 2]), moved);
+                turnover.work -= dot(n.force(k, pressure, [0.0; 2]), moved);
                 self.cling(k, pressure, ground, lists, ledger, &mut turnover);
             }
             if n.stamp[k] != 0 && pressure == 0.0 && n.spread[k].reaches(depth, n.top(k)) {
@@ -254,16 +256,12 @@ impl Scene<'_> {
         if loaded > 0 {
             self.push_aside(patch, port, x, ground, ledger, &mut turnover);
         }
-        ledger.port_work += turnover.work;
-        ledger.dissipated += turnover.heat;
-        ledger.owed += turnover.entered;
+        ledger.take(&turnover);
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
             contact_memory::remember(&mut ground.wheels, wheel.rolled(x));
         }
-        let entry = patch.wheel.as_ref().and_then(|wheel| {
-            let [a, b] = wheel.entry(x)?;
-            Some(in_world(port, [0.0, a, b]))
-        });
+        let entry = patch.wheel.as_ref().and_then(|wheel| wheel.entry(x));
+        let entry = entry.map(|[a, b]| in_world(port, [0.0, a, b]));
         carry_slip(ground, lists, first, entry, ledger.stamp);
         Ok(loaded)
     }
@@ -333,6 +331,15 @@ impl Scene<'_> {
         lists.slid_in.push(false);
         lists.slid.push([0.0; 2]);
         ledger.elastic += held;
+    }
+
+    /// The pressure at node k, where it was not asked for before, and what a law with a state keeps.
+    fn pressure(&self, k: usize, depth: f64, asked: Option<f64>, out: &mut KeptContact) -> Result<f64> {
+        match asked {
+            _ if kept_by_law(&self.patches.law(k).curve) => self.kept(k, depth, out),
+            Some(pressure) => Ok(pressure),
+            None => Ok(self.patches.pressure(k, depth)?.0),
+        }
     }
 
     /// The pressure of a law with a state at node k, and what it keeps.

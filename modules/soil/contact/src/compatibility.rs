@@ -5,8 +5,9 @@
 //! kinks of unloading and slip until |r| falls. So T is what the law gives at the motion that the bodies then make: nothing is
 //! left to iterate between both, and action equals reaction as far as the bodies are linear within the step.
 
-use crate::assemble::{Noted, Stiffness};
+use crate::assemble::Noted;
 use crate::patch::Patches;
+use crate::vectors::Stiffness;
 use terraglue_subsystem::{Estimate, Result};
 
 /// Newton steps at most.

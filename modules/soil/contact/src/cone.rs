@@ -6,9 +6,9 @@
 //! and m = c·ρ·⅓πR²H from z = H on. Its momentum m·w (w: speed into the soil) gives the force d(m·w)/dt. The soil does not
 //! pull at the foot: where the foot stops or leaves, the cone loses what it has as heat.
 
-use crate::assemble::Stiffness;
 use crate::contact_memory::Remembered;
 use crate::patch_nodes::PatchNodes;
+use crate::vectors::Stiffness;
 use std::f64::consts::{FRAC_PI_3, PI};
 
 /// The cone under one contact as of the last commit. Part of the committed state.

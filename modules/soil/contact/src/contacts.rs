@@ -1,6 +1,5 @@
 //! What is told of each wheel and foot: numbers of the last commit, one set per contact.
 
-use crate::patch::Patch;
 use crate::patch_nodes::PatchNodes;
 use crate::wheel::Wheel;
 use terraglue_subsystem::{Causality, Variable};
@@ -130,11 +129,11 @@ impl Touch {
         }
     }
 
-    /// Takes the wrench on the body and its motion `x` over `h` seconds.
-    pub fn under(&mut self, patch: &Patch, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
+    /// Takes what rolls there, the wrench on the body and its motion `x` over `h` seconds.
+    pub fn under(&mut self, wheel: Option<&Wheel>, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
         self.normal = wrench[0];
         self.pull = wrench[1];
-        if let Some(wheel) = &patch.wheel {
+        if let Some(wheel) = wheel {
             self.roll(wheel, wrench, x, h);
         }
     }

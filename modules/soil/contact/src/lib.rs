@@ -20,6 +20,7 @@ mod bookkeeping;
 mod bound;
 mod cell;
 mod chunk;
+mod clinging;
 mod compatibility;
 mod cone;
 mod contact_memory;

@@ -1,17 +1,8 @@
 //! The inverse of the normal law: how deep is the foot under a normal force?
 
+use crate::clinging::Clinging;
 use crate::patch::Patches;
-use crate::vectors::{displacement, dot};
 use terraglue_subsystem::Result;
-
-/// A node that clings to a foot: it lets go at the shift `end` (m); up to there its normal force is `stiffness`·shift −
-/// `at_zero`.
-#[derive(Clone, Copy, Debug)]
-pub struct Clinging {
-    end: f64,
-    stiffness: f64,
-    at_zero: f64,
-}
 
 /// Relative accuracy of the force.
 const TOLERANCE: f64 = 1e-14;
@@ -29,14 +20,14 @@ impl Patches {
     /// # Errors
     /// The law, which is a module, has no answer.
     pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6]) -> Result<f64> {
-        self.turn(p, x);
+        self.nodes.turn(self.ports[p].nodes.clone(), x);
         let (free, full) = match self.bracket(p, force)? {
             Some(bracket) => bracket,
             None => return Ok(self.ports[p].surface),
         };
         if force <= 0.0 {
             self.list_clinging(p);
-            return Ok(-self.held(force).unwrap_or(free));
+            return Ok(-self.clinging.held(force).unwrap_or(free));
         }
         let mut at = *x;
         let (mut low, mut high) = (free, full);
@@ -73,49 +64,15 @@ impl Patches {
         Ok(-shift)
     }
 
-    fn turn(&mut self, p: usize, x: &[f64; 6]) {
-        let n = &mut self.nodes;
-        n.turned.resize(n.depth.len(), 0.0);
-        let aside = [0.0, x[1], x[2], x[3], x[4], x[5]];
-        for k in self.ports[p].nodes.clone() {
-            n.turned[k] = n.depth[k] - dot(n.facing[k].press, displacement(n.arm[k], &aside));
-        }
-    }
-
     /// Largest force with which the soil holds back the foot of patch `p` as it is lifted, N: its nodes let go one after
     /// the other.
     pub fn pull(&mut self, p: usize) -> f64 {
         if self.laws[self.ports[p].laws.clone()].iter().all(|law| law.adhesion == 0.0) {
             return 0.0;
         }
-        self.turn(p, &[0.0; 6]);
+        self.nodes.turn(self.ports[p].nodes.clone(), &[0.0; 6]);
         self.list_clinging(p);
-        let mut most = 0.0_f64;
-        self.peel(|end, stiffness, at_zero| {
-            most = most.max(at_zero - stiffness * end);
-            None
-        });
-        most
-    }
-
-    /// Shift at which clinging soil pulls with −`force` ≥ 0 N; `None` where it cannot.
-    fn held(&self, force: f64) -> Option<f64> {
-        self.peel(|end, stiffness, at_zero| {
-            (stiffness * end - at_zero <= force).then(|| (force + at_zero) / stiffness)
-        })
-    }
-
-    /// Walks up from letting go to letting go: `visit` gets the shift and the line on which the force falls to there.
-    fn peel(&self, mut visit: impl FnMut(f64, f64, f64) -> Option<f64>) -> Option<f64> {
-        let sum = |of: fn(&Clinging) -> f64| self.clinging.iter().map(of).sum::<f64>();
-        let (mut stiffness, mut at_zero) = (sum(|c| c.stiffness), sum(|c| c.at_zero));
-        for c in &self.clinging {
-            if let Some(found) = visit(c.end, stiffness, at_zero) {
-                return Some(found);
-            }
-            (stiffness, at_zero) = (stiffness - c.stiffness, at_zero - c.at_zero);
-        }
-        None
+        self.clinging.most()
     }
 
     /// The nodes that cling to the foot of patch `p`, those that let go first at the front.
@@ -132,7 +89,7 @@ impl Patches {
                 list.push(Clinging { end, stiffness: stiffness * down, at_zero: stiffness * touch });
             }
         }
-        list.sort_unstable_by(|a, b| b.end.total_cmp(&a.end));
+        list.sort();
         self.clinging = list;
     }
 

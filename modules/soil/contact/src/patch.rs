@@ -3,10 +3,10 @@
 //! Built once per step from the committed state into flat arrays, so that trials touch neither the lattice nor
 //! the allocator.
 
+use crate::clinging::ClingingNodes;
 use crate::cone::{self, Cone};
 use crate::contact_memory::recall;
 use crate::ground::Ground;
-use crate::normal::Clinging;
 use crate::patch_nodes::{Facing, PatchNodes, Plane};
 use crate::rows::Rows;
 use crate::size::Size;
@@ -133,7 +133,7 @@ pub struct Patches {
     /// Sides in the soil, port after port.
     pub sides: Vec<Side>,
     /// Clinging nodes; scratch of [`Patches::pull`].
-    pub(crate) clinging: Vec<Clinging>,
+    pub(crate) clinging: ClingingNodes,
     /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::EnergyLedger::pay`].
     pub in_debt: bool,
     /// Whether this is the first step of all: what is inside the ground then stands in its own print.
@@ -213,22 +213,7 @@ impl Patches {
         self.bear(&laws[0].direction, &wall, b, range.clone());
         self.start(range.clone())?;
         if laws[0].direction.passive_pressure {
-            let law = &self.laws[local.start];
-            let beside = Beside {
-                lattice: ground.heights.lattice(),
-                levels: &|i, j| ground.levels(i, j),
-                passive: law.passive,
-                stiffness: law.curve.unloading(),
-                n_z,
-                wedge: law.wedge,
-            };
-            let mut rows = std::mem::take(&mut self.rows);
-            let mut sides = std::mem::take(&mut self.sides);
-            let pressed = |k: usize| yielded(self, k);
-            let gathered =
-                wall::gather(&self.nodes, range.clone(), &beside, pressed, &mut rows, &mut sides, &mut wall);
-            (self.rows, self.sides) = (rows, sides);
-            gathered?;
+            gather_wall(self, (range.clone(), local.start), ground, n_z, &mut wall)?;
             if let Some(wheel) = &wheel {
                 // a rim pushes with its axle, however it turns
                 wall.arm = [wheel.radius, 0.0, 0.0];
@@ -430,34 +415,24 @@ impl Patches {
             for a in 0..b {
                 let (nodes_a, nodes_b) = (step.ports[a].nodes(step.nodes), step.ports[b].nodes(step.nodes));
                 if overlap(nodes_a, nodes_b) {
-                    self.share_pair(self.ports[a].nodes.clone(), self.ports[b].nodes.clone());
+                    let (a, b) = (self.ports[a].nodes.clone(), self.ports[b].nodes.clone());
+                    self.nodes.share_between(a, b);
                 }
             }
-        }
-    }
-
-    fn share_pair(&mut self, a: std::ops::Range<usize>, b: std::ops::Range<usize>) {
-        for k in a {
-            let Some(l) = b.clone().find(|l| self.nodes.index[*l] == self.nodes.index[k]) else { continue };
-            let loser = if self.nodes.depth[k] >= self.nodes.depth[l] { l } else { k };
-            self.nodes.area[loser] = 0.0;
         }
     }
 
     fn evaluate_at_rest(&mut self, p: usize) -> Result {
         let (force, strength) = self.at_rest(p)?;
         let pull = self.pull(p);
-        let surface = if force[0] != 0.0 { 0.0 } else { self.highest(p).clamp(-FAR, 0.0) };
+        let surface = if force[0] != 0.0 {
+            0.0
+        } else {
+            self.nodes.highest(self.ports[p].nodes.clone()).clamp(-FAR, 0.0)
+        };
         let patch = &mut self.ports[p];
         (patch.force, patch.strength, patch.surface, patch.pull) = (force, strength, surface, pull);
         Ok(())
-    }
-
-    /// How far the foot of patch `p` is below where it just touches, along n, m.
-    fn highest(&self, p: usize) -> f64 {
-        let n = &self.nodes;
-        let loaded = self.ports[p].nodes.clone().filter(|k| n.area[*k] > 0.0);
-        loaded.fold(f64::NEG_INFINITY, |h, k| h.max((n.depth[k] - n.permanent[k]) / n.facing[k].press[0]))
     }
 }
 
@@ -508,6 +483,31 @@ fn read_node(nodes: &mut PatchNodes, port: &Port, node: &Node, ground: &Ground, 
     ground.law_memory.read([node.i, node.j], &mut nodes.memory);
     nodes.mobilised.push(laws[number].shear.mobilised(state.shear.slip));
     nodes.facing.push(Facing::new(port, node.slope));
+}
+
+/// Gathers the sides of the contact whose nodes are `range` and whose first law is number `law`.
+fn gather_wall(
+    patches: &mut Patches,
+    (range, law): (std::ops::Range<usize>, usize),
+    ground: &Ground,
+    n_z: f64,
+    wall: &mut Wall,
+) -> Result {
+    let mut rows = std::mem::take(&mut patches.rows);
+    let mut sides = std::mem::take(&mut patches.sides);
+    let law = &patches.laws[law];
+    let beside = Beside {
+        lattice: ground.heights.lattice(),
+        levels: &|i, j| ground.levels(i, j),
+        passive: law.passive,
+        stiffness: law.curve.unloading(),
+        n_z,
+        wedge: law.wedge,
+    };
+    let pressed = |k: usize| yielded(patches, k);
+    let gathered = wall::gather(&patches.nodes, range, &beside, pressed, &mut rows, &mut sides, wall);
+    (patches.rows, patches.sides) = (rows, sides);
+    gathered
 }
 
 /// Pressure at node k over that at which it yields.

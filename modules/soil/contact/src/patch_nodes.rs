@@ -1,7 +1,7 @@
 //! The nodes below contacts: per node depth, area, history, how the underside faces the soil; one array per quantity.
 
 use crate::spread::Spread;
-use crate::vectors::dot;
+use crate::vectors::{displacement, dot};
 use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Port;
 
@@ -127,6 +127,44 @@ impl PatchNodes {
         let (all, in_plane) = (e[0] * e[0] + e[1] * e[1], flat[0] * flat[0] + flat[1] * flat[1]);
         let scale = if in_plane > 0.0 { stiffness * (all / in_plane).sqrt() } else { 0.0 };
         flat.map(|c| scale * c)
+    }
+
+    /// Force of a node on the body along n, t1, t2 under a pressure and a shear stress.
+    #[inline]
+    pub fn force(&self, k: usize, pressure: f64, tau: [f64; 2]) -> [f64; 3] {
+        let facing = &self.facing[k];
+        let area = self.area[k];
+        let inclined = area * facing.stretch;
+        std::array::from_fn(|c| {
+            area * pressure * facing.press[c]
+                - inclined * (tau[0] * facing.along[0][c] + tau[1] * facing.along[1][c])
+        })
+    }
+
+    /// Of the nodes that two contacts cover, the deeper one presses; the other one's area there becomes 0.
+    pub fn share_between(&mut self, a: std::ops::Range<usize>, b: std::ops::Range<usize>) {
+        for k in a {
+            let Some(l) = b.clone().find(|l| self.index[*l] == self.index[k]) else { continue };
+            let loser = if self.depth[k] >= self.depth[l] { l } else { k };
+            self.area[loser] = 0.0;
+        }
+    }
+
+    /// How far the foot on nodes is below where it just touches, along n, m.
+    pub fn highest(&self, range: std::ops::Range<usize>) -> f64 {
+        let loaded = range.filter(|k| self.area[*k] > 0.0);
+        loaded.fold(f64::NEG_INFINITY, |h, k| {
+            h.max((self.depth[k] - self.permanent[k]) / self.facing[k].press[0])
+        })
+    }
+
+    /// Depths of nodes when their foot has moved by `x` but for X_n, into `turned`.
+    pub fn turn(&mut self, range: std::ops::Range<usize>, x: &[f64; 6]) {
+        self.turned.resize(self.depth.len(), 0.0);
+        let aside = [0.0, x[1], x[2], x[3], x[4], x[5]];
+        for k in range {
+            self.turned[k] = self.depth[k] - dot(self.facing[k].press, displacement(self.arm[k], &aside));
+        }
     }
 
     /// Forgets all nodes; keeps the room.

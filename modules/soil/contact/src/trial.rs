@@ -1,7 +1,7 @@
 //! Trials of a soil under motion or force, and the derivatives at the last one.
 
-use crate::assemble::Stiffness;
 use crate::patch::{Patch, Patches};
+use crate::vectors::Stiffness;
 use terraglue_subsystem::{Error, Level, Motion, Response, Result};
 
 /// Normal force at which the slope of the law is taken where the foot carries less, N: the compliance of a

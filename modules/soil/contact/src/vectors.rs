@@ -1,4 +1,7 @@
-//! Vectors along n, t1, t2 of a port.
+//! Vectors along n, t1, t2 of a port, and the stiffness between them.
+
+/// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
+pub type Stiffness = [[f64; 6]; 6];
 
 /// Displacement along n, t1, t2 of a point at `arm` for X = (u, θ): u + θ × arm.
 #[inline]

@@ -235,28 +235,12 @@ pub fn gather(
     let (spacing, n_z) = (beside.lattice.spacing, beside.n_z);
     rows.places.clear();
     let (mut arm, mut sum, mut face) = ([0.0; 3], 0.0, 0.0);
-    let covered = |k: Option<usize>| k.map_or(0.0, |k| nodes.area[k] * n_z / (spacing * spacing));
     for k in range {
         let part = pressed(k)?;
         if part <= 0.0 || nodes.area[k] <= 0.0 {
             continue;
         }
-        let ([i, j], cell) = (nodes.index[k], rows.cell(nodes.index[k]));
-        let lower = nodes.reference[k] - nodes.depth[k] / n_z;
-        let own = covered(Some(k));
-        // towards +x, −x, +y and −y: width of the face and, times that, height of the bed above it and of the loose soil on the bed
-        let mut faces = [[0.0; 3]; 4];
-        for (face, (di, dj)) in faces.iter_mut().zip(NEIGHBOURS) {
-            let next = rows.beside(cell, [di, dj]);
-            let outside = own - covered(next);
-            // soil in a cell that is covered in part stands as high as it did before it was pressed
-            let bed = next.map_or_else(|| (beside.levels)(i + di, j + dj)[0], |k| nodes.reference[k]);
-            let above = bed - lower;
-            if outside > 0.0 && above > 0.0 {
-                let (width, on_bed) = (outside * spacing, beside.loose([i, j], (di, dj), above));
-                *face = [width, width * above, width * on_bed];
-            }
-        }
+        let faces = faces(nodes, k, beside, rows);
         let [east, west, north, south] = faces;
         let net = [east[0] - west[0], north[0] - south[0]];
         let [width, height, loose] = [0, 1, 2].map(|c| faces.iter().map(|face| face[c]).sum::<f64>());
@@ -285,6 +269,29 @@ pub fn gather(
         wall.turn_about_middle(&mut sides[first..], &rows.places, sum);
     }
     Ok(())
+}
+
+/// The faces of node k that stand in the soil, towards +x, −x, +y and −y: width of the face and, times that, height of the bed above
+/// it and of the loose soil on the bed.
+fn faces(nodes: &PatchNodes, k: usize, beside: &Beside, rows: &Rows) -> [[f64; 3]; 4] {
+    let (spacing, n_z) = (beside.lattice.spacing, beside.n_z);
+    let covered = |k: Option<usize>| k.map_or(0.0, |k| nodes.area[k] * n_z / (spacing * spacing));
+    let ([i, j], cell) = (nodes.index[k], rows.cell(nodes.index[k]));
+    let lower = nodes.reference[k] - nodes.depth[k] / n_z;
+    let own = covered(Some(k));
+    let mut faces = [[0.0; 3]; 4];
+    for (face, (di, dj)) in faces.iter_mut().zip(NEIGHBOURS) {
+        let next = rows.beside(cell, [di, dj]);
+        let outside = own - covered(next);
+        // soil in a cell that is covered in part stands as high as it did before it was pressed
+        let bed = next.map_or_else(|| (beside.levels)(i + di, j + dj)[0], |k| nodes.reference[k]);
+        let above = bed - lower;
+        if outside > 0.0 && above > 0.0 {
+            let (width, on_bed) = (outside * spacing, beside.loose([i, j], (di, dj), above));
+            *face = [width, width * above, width * on_bed];
+        }
+    }
+    faces
 }
 
 impl Remembered for Push {

@@ -2,7 +2,7 @@
 //! curves are left out in turn (jackknife over groups; Efron and Tibshirani 1993, An Introduction to the
 //! Bootstrap, ch. 11) and the spread of the answers tells how well the numbers are known.
 
-use crate::plates::{FitLaw, PlateNumbers, Reading};
+use crate::plate_law::{FitLaw, PlateNumbers, Reading};
 use crate::{solve::solve, student};
 
 /// Probability that the interval holds the number.

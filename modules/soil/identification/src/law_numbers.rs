@@ -1,7 +1,7 @@
 //! The numbers of a law that is a module, from its schema, and its pressures at readings.
 
 use crate::least_squares::Free;
-use crate::plates::Reading;
+use crate::plate_law::Reading;
 use terraglue_subsystem::{NodeLaw, Parameter, PressureAnswer, PressureNodes, Result};
 
 /// Numbers to start from where a schema gives none: a loose soil.

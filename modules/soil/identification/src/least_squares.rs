@@ -2,7 +2,7 @@
 //! Levenberg (1944, Quart. Appl. Math. 2) and Marquardt (1963, J. SIAM 11) with differences for derivatives.
 
 use crate::interval::{Basis, Interval, jackknife};
-use crate::plates::{FitError, Reading};
+use crate::plate_law::{FitError, Reading};
 
 /// A number that is to be found.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Least squares of ln p = ln m + ln(λ·u/u_0 + (1 − λ)·w/w_0) + n·ln x: for a share λ of the cohesive factor the rest
 //! is a straight line, so only λ in 0 … 1 is searched.
 
-use crate::plates::{FitError, FitLaw, PlateNumbers, Reading};
+use crate::plate_law::{FitError, FitLaw, PlateNumbers, Reading};
 
 /// Points of the coarse search for λ, and halvings of the interval around the best one.
 const COARSE: u32 = 64;

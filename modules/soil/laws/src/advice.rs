@@ -1,7 +1,7 @@
 //! What of a soil's numbers is accepted and yet unlikely to be meant.
 
 use crate::parameters::{Family, SoilParameters};
-use crate::straight::SMALL_CONTACT;
+use crate::softened::SMALL_CONTACT;
 use crate::{PressureLaw, SoilExpressions};
 use serde_json::{Map, Value};
 use terraglue_subsystem::{Advice, Config};

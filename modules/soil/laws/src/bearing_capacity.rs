@@ -1,7 +1,8 @@
 //! Bearing capacity mobilised with the depth: p = (c·N_c + γ·b·N_γ)·(z/z_r)ⁿ, the cohesion and the width term of Terzaghi
 //! (1943, Theoretical Soil Mechanics, ch. VIII).
 
-use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
+use crate::first_loading::FirstLoading;
+use crate::pressure_sinkage::PressureSinkage;
 
 /// Bearing capacity that is reached at the depth z_r, whatever the size. At a given depth the pressure rises with the size
 /// at any n, as plates on dry sand show; Bekker's law with k_c ≥ 0 cannot do that.

@@ -1,6 +1,7 @@
 //! Bekker's law: p = (k_c/b + k_φ)·zⁿ (Bekker 1956, Theory of Land Locomotion).
 
-use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
+use crate::first_loading::FirstLoading;
+use crate::pressure_sinkage::PressureSinkage;
 
 /// Bekker's law. The modulus of the power law rises as the contact becomes narrower.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use crate::bearing_capacity::BearingCapacity;
 use crate::bekker::Bekker;
 use crate::expression::SoilExpressions;
-use crate::pressure_sinkage::{PRESSURE_LAWS, PressureLaw};
+use crate::pressure_law::{PRESSURE_LAWS, PressureLaw};
 use crate::reece::Reece;
 use crate::rolling::Rolling;
 use crate::shear::ShearLaw;
@@ -106,6 +106,124 @@ impl Direction {
     }
 }
 
+/// A number that a scenario gives.
+fn number(name: &str, unit: &str, help: &str) -> Parameter {
+    Parameter { unit: unit.into(), ..Parameter::of(name, ParameterType::Number, help) }
+}
+
+/// The pressure-sinkage law and its numbers.
+fn pressure_schema() -> Vec<Parameter> {
+    vec![
+        Parameter::of("pressure_law", ParameterType::Text, "pressure-sinkage law")
+            .or(PRESSURE_LAWS[0])
+            .choices(&PRESSURE_LAWS),
+        number("n", "", "exponent of the pressure-sinkage law").within(0.05, 3.0),
+        number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)").within(0.0, 1e9).optional().usually(
+            "N/m^(n+1)",
+            20.0,
+            3e5,
+        ),
+        number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)").within(0.0, 1e12).optional().usually(
+            "N/m^(n+2)",
+            1.5e4,
+            2.5e7,
+        ),
+        number("k_c_prime", "", "reece: k_c' of (c k_c' + gamma b k_phi') (z/b)^n")
+            .within(0.0, 1e9)
+            .optional(),
+        number("k_phi_prime", "", "reece: k_phi'").within(0.0, 1e9).optional(),
+        number("N_c", "", "bearing: N_c of (c N_c + gamma b N_gamma) (z/z_r)^n").within(0.0, 1e9).optional(),
+        number("N_gamma", "", "bearing: N_gamma").within(0.0, 1e9).optional(),
+        Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r")
+            .positive()
+            .usually("m", 0.005, 2.0),
+    ]
+}
+
+/// The strength of the soil.
+fn strength_schema() -> Vec<Parameter> {
+    vec![
+        number("c_pa", "Pa", "cohesion").within(0.0, 1e7).usually("Pa", 100.0, 2e5),
+        number(
+            "wall_cohesion_pa",
+            "Pa",
+            "cohesion that holds steep slopes; c_pa where absent, 0 in dry sand, whose c_pa is the intercept of a fit",
+        )
+        .within(0.0, 1e7)
+        .optional(),
+        number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
+        number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto")
+            .positive()
+            .usually("m", 0.002, 0.12),
+        number("density_kg_m3", "kg/m^3", "bulk density")
+            .positive()
+            .optional()
+            .usually("kg/m^3", 100.0, 3500.0),
+    ]
+}
+
+/// How the soil springs back, and what gravity changes.
+fn elastic_schema() -> Vec<Parameter> {
+    vec![
+        number(
+            "elastic_stiffness_pa_m",
+            "Pa/m",
+            "stiffness of unloading and reloading; where absent 4.4 times that of first loading down to 2 cm (Wong 1984)",
+        )
+        .positive()
+        .optional(),
+        number(
+            "measured_gravity_m_s2",
+            "m/s^2",
+            "bekker: acceleration of gravity under which k_phi was measured",
+        )
+        .positive()
+        .optional(),
+        Parameter::of(
+            "gravity_scaling",
+            ParameterType::Bool,
+            "bekker: scale k_phi, which stands for the weight of the soil, from measured_gravity_m_s2 to the gravity of the scenario (Reece 1965)",
+        )
+        .or(false),
+    ]
+}
+
+/// What is between feet and soil.
+fn interface_schema() -> Vec<Parameter> {
+    vec![
+        number(
+            "interface_phi_rad",
+            "rad",
+            "angle of friction between feet and soil; phi_rad where absent",
+        )
+        .within(0.0, 1.2)
+        .optional(),
+        number(
+            "interface_c_pa",
+            "Pa",
+            "shear strength between feet and soil without pressure; c_pa where absent",
+        )
+        .within(0.0, 1e7)
+        .optional()
+        .usually("Pa", 10.0, 2e5),
+        number(
+            "adhesion_pa",
+            "Pa",
+            "tension with which soil clings to a foot that lifts off, until it lets go; none where absent",
+        )
+        .within(0.0, 1e7)
+        .optional()
+        .usually("Pa", 10.0, 2e5),
+        number(
+            "added_mass",
+            "",
+            "part of the mass of the cone of soil under a foot that moves with it and resists by its inertia (Aguilar and Goldman 2016); 0: none",
+        )
+        .or(0.0)
+        .within(0.0, 10.0),
+    ]
+}
+
 /// A pressure–sinkage law and the numbers that it alone has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -160,100 +278,10 @@ impl SoilParameters {
     /// What a module that uses these laws takes from its scenario table. The usual spans are those of `models/soils.csv`,
     /// widened by about three.
     pub fn schema() -> Vec<Parameter> {
-        let number = |name, unit: &str, help| Parameter {
-            unit: unit.into(),
-            ..Parameter::of(name, ParameterType::Number, help)
-        };
-        let text = |name, help| Parameter::of(name, ParameterType::Text, help);
-        let mut parameters = vec![
-            text("pressure_law", "pressure-sinkage law").or(PRESSURE_LAWS[0]).choices(&PRESSURE_LAWS),
-            number("n", "", "exponent of the pressure-sinkage law").within(0.05, 3.0),
-            number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)")
-                .within(0.0, 1e9)
-                .optional()
-                .usually("N/m^(n+1)", 20.0, 3e5),
-            number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)")
-                .within(0.0, 1e12)
-                .optional()
-                .usually("N/m^(n+2)", 1.5e4, 2.5e7),
-            number("k_c_prime", "", "reece: k_c' of (c k_c' + gamma b k_phi') (z/b)^n")
-                .within(0.0, 1e9)
-                .optional(),
-            number("k_phi_prime", "", "reece: k_phi'").within(0.0, 1e9).optional(),
-            number("N_c", "", "bearing: N_c of (c N_c + gamma b N_gamma) (z/z_r)^n")
-                .within(0.0, 1e9)
-                .optional(),
-            number("N_gamma", "", "bearing: N_gamma").within(0.0, 1e9).optional(),
-            Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r")
-                .positive()
-                .usually("m", 0.005, 2.0),
-            number("c_pa", "Pa", "cohesion").within(0.0, 1e7).usually("Pa", 100.0, 2e5),
-            number(
-                "wall_cohesion_pa",
-                "Pa",
-                "cohesion that holds steep slopes; c_pa where absent, 0 in dry sand, whose c_pa is the intercept of a fit",
-            )
-            .within(0.0, 1e7)
-            .optional(),
-            number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
-            number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto")
-                .positive()
-                .usually("m", 0.002, 0.12),
-            number("density_kg_m3", "kg/m^3", "bulk density")
-                .positive()
-                .optional()
-                .usually("kg/m^3", 100.0, 3500.0),
-            number(
-                "elastic_stiffness_pa_m",
-                "Pa/m",
-                "stiffness of unloading and reloading; where absent 4.4 times that of first loading down to 2 cm (Wong 1984)",
-            )
-            .positive()
-            .optional(),
-            number(
-                "measured_gravity_m_s2",
-                "m/s^2",
-                "bekker: acceleration of gravity under which k_phi was measured",
-            )
-            .positive()
-            .optional(),
-            Parameter::of(
-                "gravity_scaling",
-                ParameterType::Bool,
-                "bekker: scale k_phi, which stands for the weight of the soil, from measured_gravity_m_s2 to the gravity of the scenario (Reece 1965)",
-            )
-            .or(false),
-            number(
-                "interface_phi_rad",
-                "rad",
-                "angle of friction between feet and soil; phi_rad where absent",
-            )
-            .within(0.0, 1.2)
-            .optional(),
-            number(
-                "interface_c_pa",
-                "Pa",
-                "shear strength between feet and soil without pressure; c_pa where absent",
-            )
-            .within(0.0, 1e7)
-            .optional()
-            .usually("Pa", 10.0, 2e5),
-            number(
-                "adhesion_pa",
-                "Pa",
-                "tension with which soil clings to a foot that lifts off, until it lets go; none where absent",
-            )
-            .within(0.0, 1e7)
-            .optional()
-            .usually("Pa", 10.0, 2e5),
-            number(
-                "added_mass",
-                "",
-                "part of the mass of the cone of soil under a foot that moves with it and resists by its inertia (Aguilar and Goldman 2016); 0: none",
-            )
-            .or(0.0)
-            .within(0.0, 10.0),
-        ];
+        let mut parameters = pressure_schema();
+        parameters.extend(strength_schema());
+        parameters.extend(elastic_schema());
+        parameters.extend(interface_schema());
         parameters.push(
             Parameter::of(
                 "contacts_shown",

@@ -3,14 +3,10 @@
 //! A law that fails, or answers what no soil does, is an error of the call in which it did. How long a step the law can answer
 //! for is no failure: the smallest of its answers is kept until the end of a trial, see [`PluginLaw::reaches`].
 
-use crate::build_up::{built_up, cohesion_and_friction};
-use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
-use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes, build_up};
+use crate::shear_strength::{YieldAnswer, YieldNodes};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use terraglue_subsystem::{
-    Error, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes,
-};
+use terraglue_subsystem::{Error, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes};
 
 struct InUse {
     law: Arc<dyn NodeLaw>,
@@ -50,6 +46,11 @@ impl PluginLaw {
     /// The same law, whose slopes are known to stay below `k_u` (Pa/m) beyond the elastic limit.
     pub(crate) fn gentle_at(self, k_u: f64) -> Self {
         Self { gentle_at: Some(k_u), ..self }
+    }
+
+    /// Whether its slopes are known to stay below `k_u` (Pa/m) beyond the elastic limit.
+    pub(crate) fn is_gentle(&self, k_u: f64) -> bool {
+        self.gentle_at == Some(k_u)
     }
 
     /// Name, for messages.
@@ -191,7 +192,7 @@ impl PluginLaw {
 
     /// Yield stresses of nodes with their derivatives by pressure and slip.
     #[inline]
-    fn strengths(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
+    pub(crate) fn strengths(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
         let YieldNodes { pressure, slip, kept } = *nodes;
         let YieldAnswer { stress, by_pressure, by_slip } = out;
         for out in [&mut *stress, &mut *by_pressure, &mut *by_slip] {
@@ -216,65 +217,11 @@ impl PluginLaw {
 
     /// Yield stress and its derivatives by pressure and slip at one node; `kept` as committed.
     #[inline]
-    fn strength(&self, pressure: f64, slip: f64, kept: &[f64]) -> Result<(f64, [f64; 2])> {
+    pub(crate) fn strength(&self, pressure: f64, slip: f64, kept: &[f64]) -> Result<(f64, [f64; 2])> {
         let (mut stress, mut by_p, mut by_slip) = ([0.0], [0.0], [0.0]);
         let mut out = YieldAnswer { stress: &mut stress, by_pressure: &mut by_p, by_slip: &mut by_slip };
         self.strengths(&YieldNodes { pressure: &[pressure], slip: &[slip], kept }, &mut out)?;
         Ok((stress[0], [by_p[0], by_slip[0]]))
-    }
-}
-
-impl PressureSinkage for PluginLaw {
-    fn under(&self, b: f64) -> FirstLoading {
-        FirstLoading::Module(self.clone(), b)
-    }
-
-    fn state_doubles(&self) -> usize {
-        Self::state_doubles(self)
-    }
-
-    fn is_gentle_at(&self, k_u: f64) -> bool {
-        self.gentle_at == Some(k_u)
-    }
-}
-
-/// The shear law of a module.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PluginShear {
-    law: PluginLaw,
-    cohesion: f64,
-    friction: f64,
-}
-
-impl PluginShear {
-    /// Takes the shear law of a module into use.
-    ///
-    /// # Errors
-    /// The law has failed, or answered what no soil does.
-    pub fn new(law: PluginLaw) -> Result<Self> {
-        let state = [0.0; MOST_LAW_STATE];
-        let state = &state[..law.state_doubles()];
-        let [cohesion, friction] = cohesion_and_friction(|p, j| law.strength(p, j, state))?;
-        Ok(Self { law, cohesion, friction })
-    }
-}
-
-impl ShearStrength for PluginShear {
-    fn cohesion(&self) -> f64 {
-        self.cohesion
-    }
-
-    fn friction(&self) -> f64 {
-        self.friction
-    }
-
-    fn yield_stress(&self, pressure: f64, slip: f64, kept: &[f64]) -> Result<(f64, [f64; 2])> {
-        built_up(self.cohesion, pressure, |p| self.law.strength(p, slip, kept))
-    }
-
-    fn yield_stresses(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
-        self.law.strengths(nodes, out)?;
-        build_up(self, nodes, out)
     }
 }
 

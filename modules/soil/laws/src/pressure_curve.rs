@@ -7,9 +7,9 @@
 //! it goes on straight where the slope has come to 0.99 k_u: beyond, unloading would give back more than was put in. So do
 //! laws as text and as modules.
 
+use crate::first_loading::FirstLoading;
 use crate::inverse;
 use crate::plugin::PluginLaw;
-use crate::pressure_sinkage::FirstLoading;
 use crate::straight::{STIFFEST, Straight};
 use terraglue_subsystem::Result;
 

@@ -1,6 +1,7 @@
 //! Reece's law: p = (c·k_c' + γ·b·k_φ')·(z/b)ⁿ (Reece 1965, Proc. Inst. Mech. Eng. 180, eq. 6).
 
-use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
+use crate::first_loading::FirstLoading;
+use crate::pressure_sinkage::PressureSinkage;
 
 /// Reece's law: for n < 1 the pressure at a depth rises with the size of the contact, for n > 1 it falls.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,8 +17,10 @@ pub(crate) const ON_YIELD: f64 = 1.0 + 1e-13;
 
 use crate::expression::ShearExpression;
 use crate::janosi_hanamoto::JanosiHanamoto;
-use crate::plugin::{PluginLaw, PluginShear};
-use crate::shear_strength::{ShearStrength, StrengthLaw};
+use crate::plugin::PluginLaw;
+use crate::plugin_laws::PluginShear;
+use crate::shear_strength::ShearStrength;
+use crate::strength_law::StrengthLaw;
 use terraglue_subsystem::Result;
 
 /// The shear law of a soil above its elastic stiffness.

@@ -1,13 +1,10 @@
-//! Laws of shear: the trait that each of them implements, and the choice among them.
+//! The trait that each law of shear implements.
 //!
 //! A law says up to which stress soil is elastic; what happens there is the same for all of them, see [`crate::ShearLaw`].
-//! To add a law: a file of its name with a type that implements [`ShearStrength`], a variant of [`StrengthLaw`], and its
-//! numbers in [`crate::SoilParameters`].
+//! To add a law: a file of its name with a type that implements [`ShearStrength`], a variant of
+//! [`StrengthLaw`](crate::StrengthLaw), and its numbers in [`crate::SoilParameters`].
 
 use crate::build_up::is_building_up;
-use crate::expression::ShearExpression;
-use crate::janosi_hanamoto::JanosiHanamoto;
-use crate::plugin::PluginShear;
 use terraglue_subsystem::Result;
 
 /// Nodes under pressure. All slices have one entry per node, `kept` as many as the law keeps, node after node.
@@ -77,51 +74,4 @@ pub(crate) fn build_up(law: &impl ShearStrength, nodes: &YieldNodes, out: &mut Y
         (out.stress[k], [out.by_pressure[k], out.by_slip[k]]) = (stress, by);
     }
     Ok(())
-}
-
-/// The law of a soil.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum StrengthLaw {
-    /// (c + p·tan φ)·(1 − e^(−j/K)).
-    JanosiHanamoto(JanosiHanamoto),
-    /// Written in the scenario, see [`crate::expression`].
-    Expression(ShearExpression),
-    /// A module of its own.
-    Plugin(PluginShear),
-}
-
-impl ShearStrength for StrengthLaw {
-    fn cohesion(&self) -> f64 {
-        match self {
-            Self::JanosiHanamoto(law) => law.cohesion(),
-            Self::Expression(law) => law.cohesion(),
-            Self::Plugin(law) => law.cohesion(),
-        }
-    }
-
-    fn friction(&self) -> f64 {
-        match self {
-            Self::JanosiHanamoto(law) => law.friction(),
-            Self::Expression(law) => law.friction(),
-            Self::Plugin(law) => law.friction(),
-        }
-    }
-
-    #[inline]
-    fn yield_stress(&self, pressure: f64, slip: f64, kept: &[f64]) -> Result<(f64, [f64; 2])> {
-        match self {
-            Self::JanosiHanamoto(law) => law.yield_stress(pressure, slip, kept),
-            Self::Expression(law) => law.yield_stress(pressure, slip, kept),
-            Self::Plugin(law) => law.yield_stress(pressure, slip, kept),
-        }
-    }
-
-    fn yield_stresses(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
-        match self {
-            Self::JanosiHanamoto(law) => law.yield_stresses(nodes, out),
-            Self::Expression(law) => law.yield_stresses(nodes, out),
-            Self::Plugin(law) => law.yield_stresses(nodes, out),
-        }
-    }
 }

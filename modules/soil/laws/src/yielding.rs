@@ -1,7 +1,8 @@
 //! The way back to the yield stress of any law, which an expression or a module gives, for one node or for many at once.
 
 use crate::shear::{ON_YIELD, Plastic, ShearLaw, ShearResponse, ShearState};
-use crate::shear_strength::{ShearStrength, StrengthLaw, YieldAnswer, YieldNodes};
+use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes};
+use crate::strength_law::StrengthLaw;
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
 /// Nodes whose yield stress is asked together.

@@ -1,8 +1,8 @@
 //! FOOT: one foot falls on power-law soil, goes down, and comes off.
 
+use super::answers::Answers;
 use super::fixture::{Setting, build, list, read, subsystem, wrench};
 use super::parameters::Parameters;
-use super::table::Answers;
 use crate::process::Outcome;
 use terraglue::Testbed;
 use terraglue_numerics::extremes::larger;

@@ -4,6 +4,7 @@
 //! other parts measure what a table of values cannot say. Models, integrators, signs:
 //! `tests/reference/gluing/README.md`.
 
+mod answers;
 mod extrapolate;
 mod feet;
 mod fixture;

@@ -1,9 +1,9 @@
 //! OSC-A and OSC-R: two masses on springs, cut between them and glued by a spring or rigidly.
 
+use super::answers::Answers;
 use super::extrapolate::{common_step, extrapolate, steps_to};
 use super::fixture::{Setting, build, list, read, step, subsystem, wrench};
 use super::parameters::Parameters;
-use super::table::Answers;
 use crate::process::Outcome;
 use terraglue_numerics::extremes::larger;
 

@@ -1,9 +1,9 @@
 //! PEND, DP and FB: mechanisms in a plane, cut at one point and glued there.
 
+use super::answers::Answers;
 use super::extrapolate::{common_step, extrapolate, steps_to};
 use super::fixture::{Setting, build, list, read, step, subsystem, wrench};
 use super::parameters::Parameters;
-use super::table::Answers;
 use crate::process::Outcome;
 use terraglue_numerics::extremes::larger;
 

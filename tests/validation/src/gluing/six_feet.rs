@@ -1,9 +1,9 @@
 //! TABLE: a body on six feet: statics, a fall, and one step on yielding soil.
 
+use super::answers::Answers;
 use super::extrapolate::{common_step, steps_to};
 use super::fixture::{Setting, build, list, read, step, subsystem, wrench};
 use super::parameters::Parameters;
-use super::table::Answers;
 use crate::process::Outcome;
 use terraglue_numerics::extremes::larger;
 

@@ -231,6 +231,32 @@ fn laid(k: u32, load: f64) -> f64 {
 
 const BALANCED: [&str; 4] = ["lunar_nominal", "LETE_sand", "snow_US_Harrison", "clayey_Thai38"];
 
+/// Script, soil, module, shape and spacing of a run whose balance is looked at.
+type BalancedCase = (usize, &'static str, Maker, usize, f64);
+
+/// Error of the balance of energies of such a run over the path of the work, and the largest fall of its heat in a step, J.
+fn balanced(rows: &[SoilRow], (script, name, make, shape, spacing): &BalancedCase) -> [f64; 2] {
+    let Some(row) = rows.iter().find(|r| r.name == *name) else { return [f64::NAN; 2] };
+    // k_u of snow: Wong (2008) gives A_u = 109.6 MPa/m² at 2 cm
+    let config = if name.starts_with("snow") {
+        row.own.replacen('{', r#"{"elastic_stiffness_pa_m":2.2e6,"#, 1)
+    } else {
+        row.own.clone()
+    };
+    let (_, geometry, lies, _) = shapes()[*shape].clone();
+    let mut bench =
+        Drive::new(make(&config, (0.6 / spacing) as u32 + 1, *spacing), geometry, lies, [0.0031, 0.0017]);
+    // weak snow carries a quarter without burying the foot
+    let share = if name.starts_with("snow") { 0.25 } else { 1.0 };
+    for k in 0..300 {
+        let now = SCRIPTS[*script].1(k);
+        let vertical =
+            if let Vertical::Load(load) = now.vertical { Vertical::Load(share * load) } else { now.vertical };
+        bench.step(&Move { vertical, ..now });
+    }
+    [bench.balance.relative(), bench.balance.fall]
+}
+
 fn balances(context: &Context) -> Outcome<Vec<Figure>> {
     let spacings: &[f64] = if context.quick { &[0.01] } else { &[0.02, 0.01, 0.005] };
     let form = if context.quick { "" } else { "long." };
@@ -249,30 +275,7 @@ fn balances(context: &Context) -> Outcome<Vec<Figure>> {
         }
     }
     let rows = eight()?;
-    let run = |(script, name, make, shape, spacing): &(usize, &str, Maker, usize, f64)| {
-        let Some(row) = rows.iter().find(|r| r.name == *name) else { return [f64::NAN; 2] };
-        // k_u of snow: Wong (2008) gives A_u = 109.6 MPa/m² at 2 cm
-        let config = if name.starts_with("snow") {
-            row.own.replacen('{', r#"{"elastic_stiffness_pa_m":2.2e6,"#, 1)
-        } else {
-            row.own.clone()
-        };
-        let (_, geometry, lies, _) = feet[*shape].clone();
-        let mut bench =
-            Drive::new(make(&config, (0.6 / spacing) as u32 + 1, *spacing), geometry, lies, [0.0031, 0.0017]);
-        // weak snow carries a quarter without burying the foot
-        let share = if name.starts_with("snow") { 0.25 } else { 1.0 };
-        for k in 0..300 {
-            let now = SCRIPTS[*script].1(k);
-            let vertical = if let Vertical::Load(load) = now.vertical {
-                Vertical::Load(share * load)
-            } else {
-                now.vertical
-            };
-            bench.step(&Move { vertical, ..now });
-        }
-        [bench.balance.relative(), bench.balance.fall]
-    };
+    let run = |case: &BalancedCase| balanced(&rows, case);
     let found = in_parallel(&cases, run);
     let mut all = Vec::new();
     for (k, (name, _)) in SCRIPTS.iter().enumerate() {

@@ -45,25 +45,11 @@ pub(super) struct Around<'a> {
 pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Error> {
     let kind = d.text(e, "type").unwrap_or("sphere").to_owned();
     let size = d.numbers(e, "size")?.unwrap_or_default();
-    let mut pose = d.pose(e)?;
-    let mut length = None;
-    if let Some(ends) = d.numbers(e, "fromto")? {
-        let [a, b, c, x, y, z] = ends[..] else {
-            return Err(d.wrong(e, format!("fromto has {} numbers; six are needed", ends.len())));
-        };
-        let (from, to) = (Vector3::new(a, b, c), Vector3::new(x, y, z));
-        let along = Unit::try_new(to - from, 1e-12)
-            .ok_or_else(|| d.wrong(e, "fromto: both ends are the same point".into()))?;
-        pose = Isometry3::from_parts(Translation3::from((from + to) / 2.0), from_z(&along));
-        length = Some((to - from).norm() / 2.0);
-    }
-    let friction = match d.text(e, "condim") {
-        Some("1") => Some(0.0),
-        _ => d.first(e, "friction")?,
+    let (pose, length) = match d.numbers(e, "fromto")? {
+        Some(ends) => between(d, e, &ends).map(|(pose, half)| (pose, Some(half)))?,
+        None => (d.pose(e)?, None),
     };
-    if let Some(bad) = friction.filter(|mu| *mu < 0.0) {
-        return Err(d.wrong(e, format!("friction = {bad} is negative: it would drive what slides")));
-    }
+    let friction = friction(d, e)?;
     if kind == "plane" {
         let normal = pose.rotation * Vector3::z_axis();
         return Ok(Geom::Plane(Plane { normal, offset: normal.dot(&pose.translation.vector), friction }));
@@ -94,12 +80,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
                 "is a height field on a body; they belong to the world, it is left out".into(),
             ));
         }
-        "hfield" => {
-            let wanted = d.text(e, "hfield").unwrap_or_default();
-            let unknown = || d.wrong(e, format!("there is no <hfield> `{wanted}` in <asset>"));
-            let field = around.assets.fields.get(wanted).ok_or_else(unknown)?;
-            ShapeGeometry::Heights(field.clone().map_err(|why| d.wrong(e, format!("hfield {why}")))?)
-        }
+        "hfield" => heights(d, e, around)?,
         "sphere" => ShapeGeometry::Sphere { radius: at(0)? },
         "capsule" => ShapeGeometry::Capsule { radius: at(0)?, half_length: half(1)? },
         "cylinder" => ShapeGeometry::Cylinder { radius: at(0)?, half_length: half(1)? },
@@ -118,6 +99,38 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
     let mass = weighs("mass")?.unwrap_or(density * solid.volume);
     let shape = Shape { name, geometry, body_from_shape: pose, collides, friction, group, mask };
     Ok(Geom::Shape(Box::new(Weighed { shape, mass, solid, notice })))
+}
+
+/// Pose in the middle between the ends that `fromto` names, and half of their distance, m.
+fn between(d: &Defaults, e: &Element, ends: &[f64]) -> Result<(Isometry3<f64>, f64), Error> {
+    let [a, b, c, x, y, z] = *ends else {
+        return Err(d.wrong(e, format!("fromto has {} numbers; six are needed", ends.len())));
+    };
+    let (from, to) = (Vector3::new(a, b, c), Vector3::new(x, y, z));
+    let along = Unit::try_new(to - from, 1e-12)
+        .ok_or_else(|| d.wrong(e, "fromto: both ends are the same point".into()))?;
+    let pose = Isometry3::from_parts(Translation3::from((from + to) / 2.0), from_z(&along));
+    Ok((pose, (to - from).norm() / 2.0))
+}
+
+/// Sliding friction; none where nothing is said.
+fn friction(d: &Defaults, e: &Element) -> Result<Option<f64>, Error> {
+    let friction = match d.text(e, "condim") {
+        Some("1") => Some(0.0),
+        _ => d.first(e, "friction")?,
+    };
+    match friction.filter(|mu| *mu < 0.0) {
+        Some(bad) => Err(d.wrong(e, format!("friction = {bad} is negative: it would drive what slides"))),
+        None => Ok(friction),
+    }
+}
+
+/// The height field that a geom names.
+fn heights(d: &Defaults, e: &Element, around: Around) -> Result<ShapeGeometry, Error> {
+    let wanted = d.text(e, "hfield").unwrap_or_default();
+    let unknown = || d.wrong(e, format!("there is no <hfield> `{wanted}` in <asset>"));
+    let field = around.assets.fields.get(wanted).ok_or_else(unknown)?;
+    Ok(ShapeGeometry::Heights(field.clone().map_err(|why| d.wrong(e, format!("hfield {why}")))?))
 }
 
 /// Types of geoms that MJCF has.

@@ -1,7 +1,7 @@
 //! Joints: how a body hangs from the one above it.
 
 use super::MjcfReader;
-use super::defaults::Element;
+use super::defaults::{Defaults, Element};
 use crate::error::Error;
 use crate::model::{AxisData, Joint, JointKind};
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
@@ -11,6 +11,35 @@ use roxmltree::Node;
 fn is_at_the_top(joint: Node) -> bool {
     let around = joint.parent_element().and_then(|body| body.parent_element());
     around.is_some_and(|n| n.has_tag_name("worldbody"))
+}
+
+/// The joint that holds a body without one.
+fn fixed(body: &str, parent: Option<usize>, child: usize, frame: Isometry3<f64>) -> Joint {
+    Joint {
+        name: format!("{body}_fixed"),
+        kind: JointKind::Fixed,
+        parent,
+        child,
+        parent_from_joint: frame,
+        child_from_joint: Isometry3::identity(),
+        axis: Vector3::x_axis(),
+        limits: None,
+        data: AxisData::default(),
+    }
+}
+
+/// What acts along the axis of a joint; `unit`: of its coordinate in rad or m.
+fn axis_data(d: &Defaults, e: &Element, unit: f64) -> Result<AxisData, Error> {
+    let not_negative = |what: &str| Ok(d.not_negative(e, what, "it would drive the joint")?.unwrap_or(0.0));
+    Ok(AxisData {
+        damping: not_negative("damping")?,
+        friction: not_negative("frictionloss")?,
+        armature: not_negative("armature")?,
+        stiffness: not_negative("stiffness")?,
+        reference: unit * d.number(e, "springref")?.unwrap_or(0.0),
+        effort: None,
+        drive: None,
+    })
 }
 
 impl MjcfReader<'_, '_> {
@@ -25,17 +54,7 @@ impl MjcfReader<'_, '_> {
     ) -> Result<(), Error> {
         let d = self.d;
         let Some(e) = joint else {
-            self.robot.joints.push(Joint {
-                name: format!("{body}_fixed"),
-                kind: JointKind::Fixed,
-                parent,
-                child,
-                parent_from_joint: frame,
-                child_from_joint: Isometry3::identity(),
-                axis: Vector3::x_axis(),
-                limits: None,
-                data: AxisData::default(),
-            });
+            self.robot.joints.push(fixed(body, parent, child, frame));
             return Ok(());
         };
         let kind =
@@ -62,17 +81,7 @@ impl MjcfReader<'_, '_> {
         let axis = Unit::try_new(axis, 1e-9).ok_or_else(|| d.wrong(&e, "axis has no direction".into()))?;
         let anchor = Isometry3::from(Translation3::from(d.vector(&e, "pos")?.unwrap_or_else(Vector3::zeros)));
         let unit = if kind == JointKind::Revolute { d.angle } else { 1.0 };
-        let not_negative =
-            |what: &str| Ok(d.not_negative(&e, what, "it would drive the joint")?.unwrap_or(0.0));
-        let data = AxisData {
-            damping: not_negative("damping")?,
-            friction: not_negative("frictionloss")?,
-            armature: not_negative("armature")?,
-            stiffness: not_negative("stiffness")?,
-            reference: unit * d.number(&e, "springref")?.unwrap_or(0.0),
-            effort: None,
-            drive: None,
-        };
+        let data = axis_data(d, &e, unit)?;
         let limits = if kind == JointKind::Spherical {
             self.ball(&e)?;
             None

@@ -8,9 +8,10 @@ use super::program::Program;
 use super::range;
 use super::symbol::{Role, Symbol};
 use crate::build_up::{FULL_SLIP, built_up, cohesion_and_friction};
+use crate::first_loading::FirstLoading;
 use crate::inverse;
 use crate::parameters::SoilParameters;
-use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
+use crate::pressure_sinkage::PressureSinkage;
 use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes, build_up};
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
@@ -59,7 +60,7 @@ impl PressureExpression {
         let bind = |v| if v == 1 { Binding::Constant(b) } else { Binding::Variable(v) };
         let (builder, root) = self.builder.rebind(self.root, bind);
         // what fitted with b as a variable fits with b as a number
-        Program::new(&builder, root).unwrap_or(self.program)
+        Program::new(builder.operations(), root).unwrap_or(self.program)
     }
 }
 
@@ -249,7 +250,12 @@ fn compile(tree: &Tree, symbols: &[Symbol]) -> std::result::Result<PressureExpre
         _ => Binding::Variable(s as u8),
     };
     let compiled = Builder::of(tree, bind).and_then(|(builder, root)| {
-        Some(PressureExpression { program: Program::new(&builder, root)?, builder, root, gentle_at: None })
+        Some(PressureExpression {
+            program: Program::new(builder.operations(), root)?,
+            builder,
+            root,
+            gentle_at: None,
+        })
     });
     compiled.ok_or_else(|| {
         let message = format!("the law is too long: at most {} operations", super::program::LONGEST);

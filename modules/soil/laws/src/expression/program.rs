@@ -3,7 +3,6 @@
 //! Plain data of fixed size: made, copied and evaluated without allocation. A batch runs each operation over a
 //! chunk of nodes, so that the list is read once per chunk.
 
-use super::build::Builder;
 use super::parse::Function;
 
 /// Most operations of a law after constants are folded.
@@ -97,8 +96,7 @@ pub struct Program {
 
 impl Program {
     /// Leaves out what the root does not need and gives every value a register; `None`: too many are needed at once.
-    pub fn new(builder: &Builder, root: u8) -> Option<Self> {
-        let operations = builder.operations();
+    pub fn new(operations: &[Operation], root: u8) -> Option<Self> {
         let mut last_use = [0usize; LONGEST];
         let mut needed = [false; LONGEST];
         needed[root as usize] = true;

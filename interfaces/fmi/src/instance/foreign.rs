@@ -1,9 +1,14 @@
-//! One call of the C interface: looked at before, and its status after.
+//! The instance on the other side of the C interface: each call of it is looked at before, and its status after.
 
-use super::functions::InstanceHandle;
-use super::{FmuInstance, goes_on};
+use super::functions::{Api, Callbacks2, InstanceHandle};
+use super::log::InstanceLog;
+use super::step_fault::StepFault;
+use crate::binary::Loaded;
 use crate::error::{Error, Result};
+use crate::floating_point::Keep;
+use std::cell::Cell;
 use std::ffi::c_int;
+use std::sync::Arc;
 
 /// Whether an instance may be called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +54,60 @@ impl From<c_int> for CallStatus {
     }
 }
 
-impl FmuInstance {
+/// Whether a status lets the caller go on.
+#[inline]
+pub fn goes_on(status: CallStatus) -> bool {
+    matches!(status, CallStatus::Ok | CallStatus::Warning)
+}
+
+/// The instance on the other side of the C interface, from its making to its end: whether it may be called, what it
+/// answered, and the values of its variables. What every step looks at stands first.
+#[repr(C)]
+pub struct ForeignInstance {
+    component: InstanceHandle,
+    // The order matters: call-backs and log outlive the instance, the library both.
+    pub(super) log: Arc<InstanceLog>,
+    health: Cell<Health>,
+    /// Begins with the functions of a step.
+    pub(super) api: Api,
+    _callbacks: Option<Box<Callbacks2>>,
+    loaded: Arc<Loaded>,
+}
+
+impl ForeignInstance {
+    /// An instance that was just made, with all that it needs to live.
+    pub(super) fn new(
+        component: InstanceHandle,
+        log: Arc<InstanceLog>,
+        api: Api,
+        callbacks: Option<Box<Callbacks2>>,
+        loaded: Arc<Loaded>,
+    ) -> Self {
+        Self { component, log, health: Cell::new(Health::Good), api, _callbacks: callbacks, loaded }
+    }
+
+    /// Where it lies, for calls inside its own call-backs.
+    pub(super) fn address(&self) -> usize {
+        self.component as usize
+    }
+
+    /// Whether every function may be called that its phase allows.
+    #[inline]
+    pub(super) fn is_good(&self) -> bool {
+        self.health.get() == Health::Good
+    }
+
+    /// Whether nothing of the instance may be called any more.
+    #[inline]
+    pub(super) fn is_dead(&self) -> bool {
+        self.health.get() == Health::Dead
+    }
+
+    /// It was reset: every function may be called again.
+    pub(super) fn recover(&self) {
+        self.health.set(Health::Good);
+    }
+
     /// Calls a function that must succeed.
     #[inline(always)]
     pub(super) fn call<F>(
@@ -70,7 +128,7 @@ impl FmuInstance {
 
     #[cold]
     fn no_plain_success(&self, function: &'static str, status: c_int) -> Result {
-        match self.unlike_ok(status) {
+        match status.into() {
             status if goes_on(status) => Ok(()),
             status => Err(self.failed(function, status)),
         }
@@ -108,7 +166,7 @@ impl FmuInstance {
         self.log.begin();
         match run(f, self.component) {
             0 => Ok(CallStatus::Ok),
-            other => Ok(self.unlike_ok(other)),
+            other => Ok(other.into()),
         }
     }
 
@@ -120,15 +178,6 @@ impl FmuInstance {
         }
         let outcome = "was not called: the instance failed before".into();
         Error::Call { function, outcome, log: Vec::new(), fatal: true }
-    }
-
-    #[cold]
-    fn unlike_ok(&self, status: c_int) -> CallStatus {
-        let status = CallStatus::from(status);
-        if status == CallStatus::Warning {
-            self.warnings.set(self.warnings.get() + 1);
-        }
-        status
     }
 
     /// The error of a status that is no success, remembered where the standard asks for it.
@@ -155,10 +204,20 @@ impl FmuInstance {
         Error::Call { function, outcome, log: self.log.last(), fatal: health != Health::Good }
     }
 
-    /// Nothing of the instance is called any more.
+    /// The error of a step in which an intermediate update went wrong.
     #[cold]
-    pub(super) fn die(&self) {
-        self.health.set(Health::Dead);
+    pub(super) fn stopped_between(
+        &self,
+        function: &'static str,
+        wrong: StepFault,
+        status: CallStatus,
+    ) -> Error {
+        let dead = wrong.fatal || !goes_on(status) && status != CallStatus::Error;
+        let error = self.lied(function, wrong.text);
+        if dead {
+            self.health.set(Health::Dead);
+        }
+        error
     }
 
     /// An error in what a function answered.
@@ -166,6 +225,25 @@ impl FmuInstance {
     pub(super) fn lied(&self, function: &'static str, outcome: String) -> Error {
         self.health.set(Health::Erroneous);
         Error::Call { function, outcome, log: self.log.last(), fatal: true }
+    }
+}
+
+impl Drop for ForeignInstance {
+    fn drop(&mut self) {
+        let _mode = Keep::new();
+        if self.is_dead() {
+            // Nothing of it may be called, so what it still holds must stay loaded.
+            std::mem::forget(self.loaded.clone());
+            return;
+        }
+        let free = match &self.api {
+            Api::Two(two) => two.free,
+            Api::Three(three) => three.free,
+        };
+        if let Some(free) = free {
+            // SAFETY: a live instance, freed once.
+            unsafe { free(self.component) };
+        }
     }
 }
 

@@ -1,13 +1,15 @@
-//! Dense symmetric systems of contact size in buffers of the caller; column-major.
+//! Dense systems of a few unknowns in buffers of the caller; column-major.
 
 /// Overwrites the lower triangle of the positive definite `a` (n × n) with L of A = L·Lᵀ. False: not definite.
-pub(crate) fn cholesky(n: usize, a: &mut [f64]) -> bool {
+#[inline]
+pub fn cholesky(n: usize, a: &mut [f64]) -> bool {
     cholesky_above(n, a, 0.0)
 }
 
 /// The same where each pivot has to be larger than a share of its entry on the diagonal: what else determines an unknown
 /// leaves so much of it.
-pub(crate) fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
+#[inline]
+pub fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
     for j in 0..n {
         let least = share * a[j * n + j];
         let (left, right) = a.split_at_mut(j * n);
@@ -27,7 +29,8 @@ pub(crate) fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
 }
 
 /// x = A⁻¹·x with the factor of [`cholesky`].
-pub(crate) fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
+#[inline]
+pub fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
     for (j, column) in l.chunks_exact(n.max(1)).take(n).enumerate() {
         let (head, below) = x.split_at_mut(j + 1);
         head[j] /= column[j];
@@ -41,7 +44,8 @@ pub(crate) fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
 
 /// Overwrites `a` (n × n) with its factors L (below the diagonal, which is 1) and U; `order`: which row takes whose place,
 /// largest pivots first. False: singular.
-pub(crate) fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
+#[inline]
+pub fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
     order.clear();
     for j in 0..n {
         let column = &a[j * n..(j + 1) * n];
@@ -64,7 +68,8 @@ pub(crate) fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
 }
 
 /// x = A⁻¹·x with the factors of [`lu`].
-pub(crate) fn lu_solve(n: usize, a: &[f64], order: &[usize], x: &mut [f64]) {
+#[inline]
+pub fn lu_solve(n: usize, a: &[f64], order: &[usize], x: &mut [f64]) {
     order.iter().enumerate().for_each(|(j, p)| x.swap(j, *p));
     for (j, column) in a.chunks_exact(n).enumerate() {
         let (head, below) = x.split_at_mut(j + 1);
@@ -79,7 +84,7 @@ pub(crate) fn lu_solve(n: usize, a: &[f64], order: &[usize], x: &mut [f64]) {
 
 /// Rank of the positive semi-definite `a` (overwritten) by Cholesky with diagonal pivoting; pivots below
 /// `tolerance` × the largest diagonal entry count as zero.
-pub(crate) fn rank(n: usize, a: &mut [f64], tolerance: f64) -> usize {
+pub fn rank(n: usize, a: &mut [f64], tolerance: f64) -> usize {
     let largest = (0..n).fold(0.0_f64, |m, i| m.max(a[i * n + i]));
     for step in 0..n {
         let p = (0..n).fold(0, |best, i| if a[i * n + i] > a[best * n + best] { i } else { best });

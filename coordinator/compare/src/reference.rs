@@ -1,11 +1,11 @@
 //! Runs against a reference: the error of the reported body, and the order at which it falls with the step.
 
-use super::{CompareRow, Orders};
-use crate::layout::at;
-use crate::reader::{PoseSeries, Recording};
-use crate::summary::Summary;
+use crate::{CompareRow, Orders};
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
+use terraglue_recording::Summary;
+use terraglue_recording::at;
+use terraglue_recording::{PoseSeries, Recording};
 
 /// Fills in the error of every row that simulates the same as `like` (of all rows where that is none) against a recording.
 ///
@@ -55,7 +55,7 @@ fn figure_orders(rows: &mut [CompareRow], like: Option<&CompareRow>, truth: &Sum
 }
 
 /// The recording of a results folder, or a recording as a file.
-pub(super) fn open(path: &Path) -> Result<Recording> {
+pub(crate) fn open(path: &Path) -> Result<Recording> {
     if path.is_dir() {
         return Recording::open(path);
     }
@@ -131,9 +131,9 @@ mod tests {
     fn the_orders_of_whole_runs_are_those_of_their_figures() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/plate_sinkage.toml");
         let scenario = terraglue_scenario::Scenario::load(path.as_ref(), &[]).expect("good");
-        let blank = crate::SummaryObserver::new(&scenario);
+        let blank = terraglue_recording::SummaryObserver::new(&scenario);
         let summary = |sinkage: f64, heat: Option<f64>| {
-            let mut s = blank.summary(1.0, 1.0, None, crate::Status::Done);
+            let mut s = blank.summary(1.0, 1.0, None, terraglue_recording::Status::Done);
             (s.mean_sinkage_m, s.energy.energies.soil_heat_j, s.motion.path_m) =
                 (Some(sinkage), heat, Some(1.0));
             s

@@ -1,23 +1,9 @@
 //! The comparison as text: for a terminal and as CSV.
 
-use crate::compare::{CompareRow, columns};
-use crate::report::energy_card;
-use crate::report::html::{number, with_prefix};
+use crate::{CompareRow, columns};
 use comfy_table::{Cell, CellAlignment, Color, Table, presets};
 use std::path::Path;
-
-/// A figure with its unit in a suitable SI prefix.
-pub(crate) fn cell(value: Option<f64>, unit: &str) -> String {
-    match value {
-        None => "–".into(),
-        Some(v) if unit.is_empty() && v == v.trunc() && v.abs() < 1e6 => format!("{v}"),
-        Some(v) if unit.is_empty() => number(v, 3),
-        Some(v) => {
-            let (text, unit) = with_prefix(v, unit, 3);
-            format!("{text}\u{a0}{unit}")
-        }
-    }
-}
+use terraglue_recording::report::energy_card;
 
 /// More runs than this do not fit side by side.
 const SIDE_BY_SIDE: usize = 5;

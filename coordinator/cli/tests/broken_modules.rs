@@ -4,10 +4,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
-use terraglue::conformance::{Options, Report, check};
+use terraglue_conformance::{Options, Report, check};
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/modules/broken")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/modules/broken")
 }
 
 /// A line of defects.tsv.
@@ -34,7 +34,7 @@ fn compiled(into: &Path, source: &str, switches: &[String]) -> PathBuf {
     let place = into.join(format!("{source}-{}", switches.join("-")));
     std::fs::create_dir_all(&place).expect("folder");
     let library = place.join(format!("libbroken_{source}_plugin.so"));
-    let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("../interfaces/plugin/include");
+    let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../interfaces/plugin/include");
     let mut cc = Command::new("cc");
     cc.args(["-std=gnu11", "-O1", "-w", "-fPIC", "-shared", "-I"]).arg(include);
     for switch in switches {
@@ -118,9 +118,9 @@ fn their_twins_without_the_mistake_pass() {
 
 #[test]
 fn every_test_stands_in_the_documents_and_every_defect_names_one() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/plugins/check-module.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/plugins/check-module.md");
     let page = std::fs::read_to_string(page).expect("the page of the checker");
-    let all = terraglue::conformance::catalogue();
+    let all = terraglue_conformance::catalogue();
     for test in all {
         let row = format!("| `{}` | {} | {} |", test.name, test.level.word(), test.promise);
         assert!(page.contains(&row), "docs/plugins/check-module.md misses the line\n{row}");

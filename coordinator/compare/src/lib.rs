@@ -2,6 +2,11 @@
 //!
 //! A run that diverged is data: its row says so and when, and keeps the figures up to then.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod columns;
 mod grounds;
 mod overview;
@@ -14,11 +19,10 @@ mod table;
 pub use reference::judge;
 pub use same::check_reference;
 
-use crate::layout::{at, other_at};
-use crate::summary::{Status, Summary};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::Result;
+use terraglue_recording::{Status, Summary, at, other_at};
 
 /// The comparison as a page.
 pub const COMPARE_PAGE: &str = "compare.html";

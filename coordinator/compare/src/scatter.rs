@@ -1,10 +1,10 @@
 //! A diagram of points on two logarithmic axes, as inline SVG: errors over steps, errors over work.
 
-use crate::report::html::escape;
 use std::fmt::Write;
+use terraglue_recording::report::html::escape;
 
 /// One line of points.
-pub(super) struct Series {
+pub(crate) struct Series {
     pub name: String,
     /// Number in the palette.
     pub colour: usize,
@@ -62,7 +62,7 @@ fn style(colour: usize) -> (&'static str, &'static str, &'static str, char) {
 }
 
 /// The diagram; none where no series has a point that a logarithm knows.
-pub(super) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<String> {
+pub(crate) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<String> {
     let good = |(x, y): &&(f64, f64)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite();
     let points = || series.iter().flat_map(|s| &s.points).filter(good);
     let (x, y) = (Axis::over(points().map(|p| p.0))?, Axis::over(points().map(|p| p.1))?);

@@ -1,10 +1,10 @@
 //! Whether an earlier run can be the reference of others: it must be a run of the same thing.
 
-use super::reference;
-use crate::inputs::fingerprints;
-use crate::reader::Recording;
+use crate::reference;
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
+use terraglue_recording::Recording;
+use terraglue_recording::fingerprints;
 use terraglue_scenario::{InputError, Scenario, differences};
 
 /// Tables whose keys say how something is computed or shown, not what.

@@ -1,10 +1,11 @@
 //! The comparison at a glance, for a terminal and the head of the page: one line per run with its distance, its prints, its energy balance and its cost. It
 //! is no wider than the terminal; all figures stand in the files and behind `--details`.
 
-use crate::compare::table::{cell, failures};
-use crate::compare::{CompareRow, choice, columns};
-use crate::report::html::number;
+use crate::columns::cell;
+use crate::table::failures;
+use crate::{CompareRow, choice, columns};
 use comfy_table::{Cell, CellAlignment, Color, ColumnConstraint, ContentArrangement, Table, presets};
+use terraglue_recording::report::html::number;
 
 /// Width where nobody looks through a terminal.
 const WIDTH: u16 = 80;
@@ -103,8 +104,8 @@ fn in_terminal(figure: CellText) -> Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::summary::PrintDepth;
-    use crate::{Status, SummaryObserver};
+    use terraglue_recording::PrintDepth;
+    use terraglue_recording::{Status, SummaryObserver};
     use terraglue_scenario::Scenario;
 
     fn rows() -> Vec<CompareRow> {

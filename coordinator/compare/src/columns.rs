@@ -1,9 +1,9 @@
 //! The figures that are compared, each with the direction in which it is better.
 
-use crate::Energies;
-use crate::compare::{CompareRow, table};
-use crate::report::cards::heard;
-use crate::summary::Summary;
+use crate::CompareRow;
+use terraglue_recording::Energies;
+use terraglue_recording::Summary;
+use terraglue_recording::report::html::{number, with_prefix, without_rounding};
 
 /// Ways, which rounding makes longer than 0.
 const WAYS: [&str; 2] = ["distance_m", "path_m"];
@@ -44,9 +44,9 @@ impl FigureColumn {
     /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
     pub fn text(&self, row: &CompareRow) -> String {
         let value = (self.value)(row);
-        let value = if WAYS.contains(&self.key) { value.map(heard) } else { value };
+        let value = if WAYS.contains(&self.key) { value.map(without_rounding) } else { value };
         let Some(summary) = row.summary.as_ref().filter(|_| value.is_none()) else {
-            return table::cell(value, self.unit);
+            return cell(value, self.unit);
         };
         match self.key {
             "max_gap_m" | "steps_not_converged" | "max_action_reaction_gap_n" => "not applicable".into(),
@@ -55,13 +55,26 @@ impl FigureColumn {
             {
                 "unknown".into()
             }
-            _ => table::cell(None, self.unit),
+            _ => cell(None, self.unit),
         }
     }
 
     /// Whether any row has something to say.
     pub fn is_shown(&self, rows: &[CompareRow]) -> bool {
-        rows.iter().any(|row| self.text(row) != table::cell(None, self.unit))
+        rows.iter().any(|row| self.text(row) != cell(None, self.unit))
+    }
+}
+
+/// A figure with its unit in a suitable SI prefix.
+pub(crate) fn cell(value: Option<f64>, unit: &str) -> String {
+    match value {
+        None => "–".into(),
+        Some(v) if unit.is_empty() && v == v.trunc() && v.abs() < 1e6 => format!("{v}"),
+        Some(v) if unit.is_empty() => number(v, 3),
+        Some(v) => {
+            let (text, unit) = with_prefix(v, unit, 3);
+            format!("{text}\u{a0}{unit}")
+        }
     }
 }
 

@@ -1,12 +1,12 @@
 //! The grounds of several runs side by side: small pictures in one scale of colours.
 
-use crate::REPORT;
-use crate::reader::{GroundRecord, Recording};
-use crate::report::colour_map::Palette;
-use crate::report::html::{escape, number, with_prefix};
-use crate::report::picture;
 use base64::Engine;
 use std::fmt::Write;
+use terraglue_recording::REPORT;
+use terraglue_recording::report::colour_map::Palette;
+use terraglue_recording::report::html::{escape, number, with_prefix};
+use terraglue_recording::report::picture;
+use terraglue_recording::{GroundRecord, Recording};
 
 /// Longest side of a picture, pixels.
 const SIDE: usize = 480;
@@ -46,7 +46,7 @@ pub(crate) fn pictures(runs: &[(&str, String, &Recording)]) -> Option<String> {
 /// The scale of colours in words and patches.
 fn legend([low, high]: [f64; 2], scale: f64, is_part: bool) -> String {
     let mut out = String::from("The ground at the end from above, coloured by sinkage, in one scale:");
-    let palette = Palette::new();
+    let palette = Palette::default();
     for share in [low / scale.max(1e-12), 0.0, 0.25, 0.5, 0.75, 1.0].into_iter().filter(|s| s * scale <= high)
     {
         let (value, unit) = with_prefix(share * scale, "m", 2);

@@ -1,17 +1,17 @@
 //! `compare.html`: the table with the best figure of each column marked, and curves of all runs in one picture.
 
-use crate::compare::scatter::{self, Series};
-use crate::compare::table::{varied, varied_keys};
-use crate::compare::{CompareRow, columns, grounds, overview, relative};
-use crate::reader::Recording;
-use crate::report::energy_card;
-use crate::report::figure::{Curve, Figure, Panel};
-use crate::report::footprints::{self, Leg};
-use crate::report::html::escape;
-use crate::report::page::Page;
-use crate::{REPORT, WindowRecord};
+use crate::scatter::{self, Series};
+use crate::table::{varied, varied_keys};
+use crate::{CompareRow, columns, grounds, overview, relative};
 use std::fmt::Write;
 use std::path::Path;
+use terraglue_recording::Recording;
+use terraglue_recording::report::energy_card;
+use terraglue_recording::report::figure::{Curve, Figure, Panel};
+use terraglue_recording::report::footprints::{self, Leg};
+use terraglue_recording::report::html::escape;
+use terraglue_recording::report::page::Page;
+use terraglue_recording::{REPORT, WindowRecord};
 
 /// A run with what its recording shows.
 pub(crate) struct Run {

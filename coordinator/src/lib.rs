@@ -23,6 +23,7 @@ pub use terraglue_host as host;
 pub use terraglue_scenario as scenario;
 pub use terraglue_subsystem as subsystem;
 pub use terraglue_terrain as terrain;
+pub use terraglue_world as world;
 
 #[cfg(feature = "program")]
 pub use terraglue_checkpoint as checkpoint;

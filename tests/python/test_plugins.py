@@ -11,7 +11,7 @@ import zipfile
 import pytest
 from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
 
-KINDS = ["soil", "robot", "controller", "law"]
+KINDS = ["soil", "robot", "controller", "law", "sensor"]
 
 
 def made(folder, kind, language):

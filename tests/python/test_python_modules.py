@@ -13,7 +13,7 @@ from conftest import ROOT, terraglue
 from test_plugins import made, played
 
 PAGE = ROOT / "docs" / "plugins" / "python.md"
-KINDS = ["soil", "robot", "controller", "law"]
+KINDS = ["soil", "robot", "controller", "law", "sensor"]
 
 
 def flat(text):
@@ -38,6 +38,14 @@ def test_a_new_soil_passes_the_checker(tmp_path):
     process = terraglue("check-module", place, "--level", "quick", "--jobs", "2")
     assert process.returncode == 0, process.stdout
     assert "in a process of its own" in flat(process.stdout)
+
+
+def test_a_new_sensor_passes_the_checker(tmp_path):
+    place, commands = made(tmp_path, "sensor", "python")
+    process = terraglue("check-module", place, "--level", "quick", "--jobs", "2")
+    assert process.returncode == 0, process.stdout
+    for test in ("same-view", "no-future", "keeps-nothing", "honest-rates"):
+        assert f"pass     {test}" in process.stdout, process.stdout
 
 
 def test_a_new_law_is_at_most_forty_lines_and_passes_the_checker(tmp_path):

@@ -146,3 +146,64 @@ def test_rerun_shows_robot_ground_and_forces(walk, tmp_path):
         assert archetype in printed, archetype
     for entity in ("/shapes/robot/body", "/ground/0_0", "/contact_forces/points"):
         assert entity in printed, entity
+
+
+def test_joints_are_there_by_name_with_the_tree_of_the_robot(walk, decoded):
+    states = decoded["/joints/robot"]
+    assert [t for t, _ in states] == [t for t, _ in decoded["/robot"]]
+    names = [joint.name for joint in states[0][1].joints]
+    assert len(names) == 24 and {f"{leg}_j{k}" for leg in ("LF", "LM", "LR", "RF", "RM", "RR") for k in (1, 2, 3, 4)} == set(names)
+    for (_, message), (_, robot) in list(zip(states, decoded["/robot"]))[::97]:
+        assert [joint.name for joint in message.joints] == names
+        for joint in message.joints:
+            own = getattr(robot, joint.name)
+            assert (joint.position, joint.velocity, joint.effort) == (own.angle, own.velocity, own.torque)
+    with open(walk / "recording.mcap", "rb") as file:
+        channel, = (c for c in make_reader(file).get_summary().channels.values() if c.topic == "/joints/robot")
+    tree = json.loads(channel.metadata["joints"])
+    frames = {t.child_frame_id for t in decoded["/tf"][0][1].transforms if t.child_frame_id.startswith("robot/")}
+    # a tree: every body but the root hangs on one joint
+    assert {joint["child"] for joint in tree} == frames - {"robot/body"} and len(tree) == len(frames) - 1
+    assert {joint["parent"] for joint in tree} <= frames
+
+
+def test_rerun_reads_joints_by_name(walk):
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    from rerun.chunk import McapReader
+
+    messages = []
+    for chunk in McapReader(str(walk / "recording.mcap")).stream():
+        batch = chunk.to_record_batch()
+        if str(chunk.entity_path) == "/joints/robot" and "foxglove.JointStates:message" in batch.schema.names:
+            messages += [row[0] for row in batch.column("foxglove.JointStates:message").to_pylist()]
+    assert len(messages) > 2000
+    joints = {joint["name"]: joint for joint in messages[-1]["joints"]}
+    last = rows(walk)[-1]
+    for name in ("LF_j2", "RR_j3"):
+        assert math.isclose(joints[name]["position"], float(last[f"robot.{name}.angle"]), rel_tol=1e-8)
+        assert math.isclose(joints[name]["effort"], float(last[f"robot.{name}.torque"]), rel_tol=1e-8)
+
+
+def test_overlays_are_recorded_where_they_are_wanted(tmp_path, decoded):
+    assert not any(topic.startswith("/overlays") for topic in decoded)
+    # a single pass leaves no residual that would say anything
+    sets = ("--set", "recording.overlays=true", "--set", 'gait.mount="robot.body"', "--set", "gluing.strategy=iterative")
+    process = terraglue("run", MOON_WALK, "--out", tmp_path, "--duration", "1", "--quiet", "--no-report", *sets)
+    assert process.returncode == 0, process.stderr
+    topics = {}
+    with open(tmp_path / "recording.mcap", "rb") as file:
+        for _, channel, _, content in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            topics.setdefault(channel.topic, []).append(content)
+    layers = {topic for topic in topics if topic.startswith("/overlays")}
+    assert layers == {f"/overlays/{layer}" for layer in (
+        "gait/foot_targets", "gait/next_footholds", "gait/support_polygon", "gluing/residual", "soil/pressure",
+        "soil/friction_cone")}
+    entity, = topics["/overlays/gait/support_polygon"][0].entities
+    assert entity.frame_id == "robot/body" and len(entity.lines[0].points) == 8
+    entity, = topics["/overlays/soil/friction_cone"][-1].entities
+    assert entity.frame_id == "world" and len(entity.lines) == 1
+    # eight lines from the apex of each cone, and eight along its edge
+    assert len(entity.lines[0].points) % 32 == 0
+    drawn = sum(math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) for message in topics["/overlays/soil/pressure"][-1:]
+                for line in message.entities[0].lines for a, b in zip(line.points[::2], line.points[1::2]))
+    assert drawn > 0.0

@@ -142,6 +142,33 @@ def test_an_exported_fmu_has_a_terminal_for_each_body_and_stays_valid(folder):
     fmu.remove()
 
 
+ARM = """<robot name="arm"><link name="base"><inertial><mass value="5"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="elbow"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="elbow" type="revolute"><parent link="base"/><child link="elbow"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="9" velocity="3"/></joint></robot>"""
+
+
+def test_an_exported_fmu_has_a_terminal_for_each_joint(tmp_path):
+    (tmp_path / "arm.urdf").write_text(ARM)
+    export("rigid-body", tmp_path / "arm.fmu", "--set", f"robot.model={tmp_path / 'arm.urdf'}")
+    fmu = Fmu(tmp_path / "arm.fmu")
+    assert validate_fmu(fmu.path) == []
+    with zipfile.ZipFile(fmu.path) as archive:
+        root = ET.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+    found = {t.get("name"): t for t in root.findall("Terminals/Terminal")}
+    # the body has the name of the joint that carries it
+    assert set(found) == {"base", "elbow", "elbow_joint"}
+    joint = found["elbow_joint"]
+    assert joint.get("terminalKind") == "org.terraglue.joint"
+    members = {m.get("memberName"): m.get("variableName") for m in joint.findall("TerminalMemberVariable")}
+    assert members == {"position": "elbow.angle", "velocity": "elbow.velocity", "torque": "elbow.torque",
+                       "torque_limit": "elbow.max_torque", "blocked": "elbow.blocked"}
+    assert set(members.values()) <= set(fmu.variables)
+    fmu.remove()
+
+
 @pytest.mark.parametrize(
     ("terminal", "says"),
     [('"hill"', "did you mean `hull`"), ("3", "takes a name in quotes"), ('"hull"\nforce = ["f"]', "stands for")],

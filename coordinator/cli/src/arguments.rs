@@ -374,11 +374,12 @@ pub enum New {
 }
 
 impl New {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::Module(Kind::Soil),
         Self::Module(Kind::Robot),
         Self::Module(Kind::Controller),
         Self::Module(Kind::Law),
+        Self::Module(Kind::Sensor),
         Self::Scenario,
     ];
 

@@ -9,8 +9,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use terraglue_host::{HostServices, Instance, LoadError, LoadedModule, SearchPath, law};
 use terraglue_scenario::{check_value, did_you_mean};
-use terraglue_subsystem::{Config, Kind, Parameter, ParameterType, Schema};
+use terraglue_subsystem::{Config, Kind, Mount, Parameter, ParameterType, Schema};
 use terraglue_terrain::SplitMix64;
+
+/// The body that a sensor sits on, of the world that it is shown.
+pub const MOUNTED: &str = "others.body";
 
 /// Numbers of a loose lunar soil (Apollo, nominal), for parameters without a default that carry these names.
 const SOIL: [(&str, f64); 8] = [
@@ -108,12 +111,13 @@ impl TestContext {
         services
     }
 
-    /// Parameters: those given, those of a usual soil, else the middle of the range.
+    /// Parameters: those given, those of a usual soil, a body to sit on, else the middle of the range.
     pub fn config(&self, schema: &Schema) -> Config {
         let mut map = Map::new();
         for p in schema.parameters.iter().filter(|p| p.default.is_null() && !p.name.ends_with('*')) {
             let soil = SOIL.iter().find(|(name, _)| *name == p.name).map(|(_, x)| Value::from(*x));
-            let value = soil.or_else(|| (!p.optional).then(|| middle(p)).flatten());
+            let usual = || if p.name == Mount::KEY { Some(Value::from(MOUNTED)) } else { middle(p) };
+            let value = soil.or_else(|| (!p.optional).then(usual).flatten());
             if let Some(value) = value {
                 insert(&mut map, &p.name, value);
             }

@@ -26,6 +26,7 @@ mod pieces;
 mod reload;
 mod run_clock;
 mod schedule;
+mod shown;
 mod sight;
 mod standing;
 mod streams;
@@ -147,7 +148,7 @@ pub struct Snapshot {
     slot: u32,
     clock: RunClock,
     fired: Vec<bool>,
-    /// What each group, faults, contact detection and the control of the steps keep from step to step.
+    /// What each group, signals, contact detection, the control of the steps and streams keep from step to step.
     memory: Vec<Vec<u64>>,
 }
 
@@ -262,9 +263,18 @@ impl Testbed {
             uncoupled::commit(&self.clock, (h, end), &mut self.subsystems)?;
             self.subsystems.read_states()?;
             self.sight.after_commit(&self.clock, (h, end), &mut self.subsystems)?;
-            self.streams.collect(&self.subsystems.instances)?;
+            self.collect_messages()?;
         }
         Ok(outcome)
+    }
+
+    /// Messages of the step that was committed: for those who look at the run, and on their way to inputs.
+    fn collect_messages(&mut self) -> Result {
+        let Self { streams, signals, subsystems, .. } = self;
+        streams.collect(&subsystems.instances, |stream, bytes| {
+            let fed = signals.links.streams.iter_mut().filter(|link| link.stream() == stream);
+            fed.for_each(|link| link.take(bytes));
+        })
     }
 
     /// Steps until `until_s`, an error, or the cancel flag; tells the observers. The observers' `finished` is
@@ -412,7 +422,7 @@ impl Testbed {
     /// [`Error::Module`]: a module that cannot keep its state.
     pub fn snapshot(&mut self, slot: u32) -> Result<Snapshot> {
         self.subsystems.instances.iter_mut().try_for_each(|i| i.save_state(slot))?;
-        let memory = self.glued.memory(self.signals.faults.remember());
+        let memory = self.glued.memory(self.signals.remember(), self.streams.remember());
         Ok(Snapshot { slot, clock: self.clock, fired: self.signals.time_line.fired(), memory })
     }
 
@@ -428,11 +438,10 @@ impl Testbed {
     /// What a snapshot holds beside the states of the instances.
     fn restore_rest(&mut self, snapshot: &Snapshot) -> Result {
         self.clock = snapshot.clock;
-        self.streams.forget();
         self.signals.time_line.set_fired(&snapshot.fired);
-        if let Some(faults) = self.glued.recall(&snapshot.memory) {
-            self.signals.faults.recall(faults);
-        }
+        let [mut signals, mut streams] = self.glued.recall(&snapshot.memory);
+        self.signals.recall(&mut signals);
+        self.streams.recall(&mut streams);
         self.subsystems.read_states()
     }
 }

@@ -10,6 +10,8 @@ use terraglue_subsystem::*;
 
 /// A ball that goes along x with the time squared, and a post that hides itself at 0.25 s.
 struct Mover {
+    fields: [FieldInfo; 1],
+    warmth: [f64; 4],
     x: f64,
     v: f64,
     next: [f64; 2],
@@ -21,13 +23,21 @@ impl Module for Mover {
         Schema { name: "mover".into(), kind: Kind::Robot, help: "Moves".into(), parameters: Vec::new() }
     }
     fn instantiate(_: &Config, _: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
-        Ok(Box::new(Self { x: 0.0, v: 0.0, next: [0.0; 2], t: 0.0 }))
+        let warmth = FieldInfo {
+            name: "warmth".into(),
+            unit: "K".into(),
+            origin: [0.0; 2],
+            spacing: 1.0,
+            size: [2; 2],
+            tile_edge: 2,
+        };
+        Ok(Box::new(Self { fields: [warmth], warmth: [0.0; 4], x: 0.0, v: 0.0, next: [0.0; 2], t: 0.0 }))
     }
 }
 
 impl Subsystem for Mover {
     fn capabilities(&self) -> Capabilities {
-        Capabilities::RETRY
+        Capabilities::RETRY | Capabilities::HIDES
     }
     fn advance(&mut self, step: &Step, _: &Input, _: &mut Response) -> Result {
         let end = step.t + step.h;
@@ -37,6 +47,7 @@ impl Subsystem for Mover {
     fn commit(&mut self, step: &Step, _: &[f64], _: &Motion) -> Result {
         [self.x, self.v] = self.next;
         self.t = step.t + step.h;
+        self.warmth = [self.t; 4];
         Ok(())
     }
     fn scene(&self) -> Scene {
@@ -65,6 +76,13 @@ impl Subsystem for Mover {
         };
         out[1] = BodyState { world_from_body: at([0.0, 5.0, 0.0]), ..BodyState::REST };
         Ok(())
+    }
+    fn fields(&self) -> &[FieldInfo] {
+        &self.fields
+    }
+    fn field_tile(&self, field: usize, _: u32, _: u32) -> Result<FieldTile<'_>> {
+        assert_eq!(field, 0);
+        Ok(FieldTile { generation: (10.0 * self.t) as u64 + 1, values: TileValues::F64(&self.warmth) })
     }
     fn shape_visibility(&self, out: &mut [bool]) -> Result {
         out[1] = self.t < 0.25;
@@ -126,6 +144,15 @@ impl Subsystem for Looker {
             // the ray meets the ball where the ball is
             assert!((hits[0].distance - 9.5 - state.world_from_body.position[0]).abs() < 1e-12);
             seen.push(state.world_from_body.position[0]);
+        }
+        // fields of the others are those at the end of the step; of those that see none are shown
+        for (k, name) in (0..).zip(world.subsystems()) {
+            let known = if k == ball.subsystem { 1 } else { 0 };
+            assert_eq!(world.fields(k).len(), known, "{name}");
+            match world.field_tile(k, 0, 0, 0) {
+                Ok(tile) => assert!(known == 1 && (tile.values.at(3) - end).abs() < 1e-12),
+                Err(e) => assert_eq!((known, e), (0, Error::Unsupported)),
+            }
         }
         let post = ShapeRef { subsystem: ball.subsystem, body: 1, shape: 1 };
         seen.push(f64::from(u8::from(world.is_visible(post))));

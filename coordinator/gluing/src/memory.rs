@@ -8,6 +8,8 @@ pub trait Remember {
     fn put_all(&mut self, values: &[f64]);
     /// Wrenches by port.
     fn put_wrenches(&mut self, wrenches: &[(u64, [f64; 6])]);
+    /// Bytes with their number.
+    fn put_bytes(&mut self, bytes: &[u8]);
 }
 
 impl Remember for Vec<u64> {
@@ -26,6 +28,16 @@ impl Remember for Vec<u64> {
             self.push(*key);
             self.extend(wrench.iter().map(|v| v.to_bits()));
         }
+    }
+
+    fn put_bytes(&mut self, bytes: &[u8]) {
+        self.push(bytes.len() as u64);
+        let word = |part: &[u8]| {
+            let mut whole = [0; 8];
+            whole[..part.len()].copy_from_slice(part);
+            u64::from_le_bytes(whole)
+        };
+        self.extend(bytes.chunks(8).map(word));
     }
 }
 
@@ -51,6 +63,14 @@ impl Recall<'_> {
         let count = (self.word() as usize).min(self.0.len());
         into.clear();
         into.extend((0..count).map(|_| self.number()));
+    }
+
+    /// Bytes.
+    pub fn bytes(&mut self, into: &mut Vec<u8>) {
+        let count = (self.word() as usize).min(8 * self.0.len());
+        into.clear();
+        into.extend((0..count.div_ceil(8)).flat_map(|_| self.word().to_le_bytes()));
+        into.truncate(count);
     }
 
     /// Wrenches by port.

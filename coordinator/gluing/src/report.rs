@@ -1,5 +1,10 @@
 //! What a strategy did in one step; the same for all strategies, so that they can be compared.
 
+use terraglue_subsystem::{Figure, Overlay};
+
+/// Height of the letters of an overlay, m.
+const LETTERS_M: f64 = 0.02;
+
 /// Figures of one step of one group. Reused from step to step: no allocation once the ports are known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepReport {
@@ -63,6 +68,25 @@ impl StepReport {
     /// Whether [`StepReport::max_gap_m`] says how far the sides lie apart.
     pub fn has_gap(&self) -> bool {
         self.joints || !self.single_pass
+    }
+
+    /// The residual of every port that carries a force, in words where it lies: the gap x1 − x2 along n after commit, m. Empty
+    /// where [`StepReport::has_gap`] is false.
+    pub fn overlays(&self) -> Vec<Overlay> {
+        let carries = |p: &&PortReport| p.wrench.iter().any(|w| *w != 0.0);
+        let text = |p: &PortReport| Figure::Text {
+            at: p.origin,
+            height: LETTERS_M,
+            text: format!("{:.1e} m", p.gap_m),
+        };
+        let overlay = |p: &PortReport| Overlay {
+            layer: "residual".into(),
+            frame: Overlay::WORLD,
+            colour: [0.9, 0.9, 0.2, 1.0],
+            figure: text(p),
+        };
+        let shown = self.ports.iter().filter(carries).filter(|_| self.has_gap());
+        shown.map(overlay).collect()
     }
 }
 

@@ -15,7 +15,7 @@ pub struct Description {
     pub version: String,
     /// MAJOR.MINOR of the ABI that it was built for.
     pub abi: String,
-    /// Soil, robot, controller or law; empty: not told.
+    /// Soil, robot, controller, law or sensor; empty: not told.
     pub kind: String,
     /// What an instance can do, in the words of [`terraglue_plugin::describe::WORDS`]; None: not told.
     pub can: Option<Vec<String>>,

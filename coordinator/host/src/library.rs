@@ -204,7 +204,15 @@ impl LoadedModule {
     ) -> std::result::Result<Instance, LoadError> {
         let (subsystem, module) = (instance_name.to_owned(), self.schema.name.clone());
         match made {
-            Ok(made) => Ok(Instance::new(instance_name, &module, self.schema.kind, made)),
+            Ok(made) => {
+                let made = Instance::new(instance_name, &module, self.schema.kind, made);
+                let wrong = made.scene().shapes.iter().find_map(|s| Some((&s.name, s.wrong()?)));
+                let message = wrong.map(|(name, why)| format!("the shape `{name}`: {why}"));
+                match message {
+                    Some(message) => Err(LoadError::Instantiate { subsystem, module, message }),
+                    None => Ok(made),
+                }
+            }
             Err(Failure::Refused(message)) => Err(LoadError::Refused { subsystem, module, message }),
             Err(Failure::Fatal(message)) => Err(LoadError::Instantiate { subsystem, module, message }),
             Err(other) => Err(LoadError::Instantiate { subsystem, module, message: other.to_string() }),

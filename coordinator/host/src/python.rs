@@ -94,7 +94,7 @@ fn parse(text: &str) -> Result<PythonFile, String> {
     let help = Some(word("help")).filter(|h| !h.is_empty()).unwrap_or_else(|| first.into());
     let kind: Kind =
         serde_json::from_value(about.get("kind").cloned().unwrap_or_default()).map_err(|_| {
-            format!("kind = \"{}\" in [module]; write soil, robot, controller or law", word("kind"))
+            format!("kind = \"{}\" in [module]; write soil, robot, controller, law or sensor", word("kind"))
         })?;
     if word("name").is_empty() {
         return Err("[module] has no name".into());

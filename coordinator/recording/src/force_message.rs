@@ -3,7 +3,7 @@
 
 use crate::layout::timestamp;
 use crate::point_cloud::Points;
-use crate::scene_message::{quaternion, vector};
+use crate::scene_message::{along, quaternion, vector};
 use foxglove::messages::{ArrowPrimitive, Color, Duration, PointCloud, Pose, SceneEntity, SceneUpdate};
 use terraglue_engine::observer::View;
 use terraglue_gluing::PortReport;
@@ -91,18 +91,6 @@ impl Forces {
 /// To an eighth of a millimetre.
 fn rounded(x: f64) -> f64 {
     (x * 8192.0).round() / 8192.0
-}
-
-/// The rotation w, x, y, z that turns the x axis along a vector.
-fn along(v: [f64; 3], length: f64) -> [f64; 4] {
-    let [x, y, z] = v.map(|c| c / length);
-    let w = 1.0 + x;
-    if w < 1e-9 {
-        return [0.0, 0.0, 0.0, 1.0];
-    }
-    // Half the angle about x × v = (0, −z, y).
-    let norm = (w * w + y * y + z * z).sqrt();
-    [w / norm, 0.0, -z / norm, y / norm]
 }
 
 #[cfg(test)]

@@ -47,6 +47,7 @@ mod mcap_writer;
 mod mend;
 mod messages;
 mod motor_work;
+mod overlays;
 mod point_cloud;
 mod prints;
 mod reader;
@@ -64,6 +65,7 @@ mod table;
 mod topics;
 mod trace;
 mod viewer_layout;
+mod visibility;
 
 pub mod report;
 

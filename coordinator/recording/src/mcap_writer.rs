@@ -11,10 +11,12 @@ use crate::joint_message::Joints;
 use crate::kept_file::KeptFile;
 use crate::layout::{RECORDING, at, nanoseconds, other_at, timestamp};
 use crate::messages::WindowRecord;
-use crate::scene_message::{frame_id, pose, quaternion, scene, vector};
+use crate::overlays::{self, Overlays};
+use crate::scene_message::{bodies, frame_id, pose, quaternion, scene, vector};
 use crate::selection::Precision;
 use crate::snapshot::{Snapshot, failed};
 use crate::topics::{self, Topic};
+use crate::visibility::Visibility;
 use crate::{energy_message, gluing_message, point_cloud, stream_topics};
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{FrameTransform, FrameTransforms, Grid, Log, PackedElementField, Vector2, log};
@@ -105,6 +107,9 @@ pub(crate) struct McapWriter {
     /// Of each subsystem: what is written when it changes, and what is written always.
     variables: Vec<[Option<Variables>; 2]>,
     joints: Vec<Joints>,
+    /// Where the scenario wants them.
+    overlays: Option<Overlays>,
+    visibility: Visibility,
     energy: Columns,
     ground: Option<GroundGrid>,
     points: Option<GroundPoints>,
@@ -149,6 +154,8 @@ impl McapWriter {
             poses: FrameTransforms::default(),
             variables: Vec::new(),
             joints: Vec::new(),
+            overlays: Overlays::of(scenario),
+            visibility: Visibility::default(),
             energy: Columns::default(),
             ground: None,
             points: None,
@@ -209,7 +216,7 @@ impl McapWriter {
     pub fn started(&mut self, view: &View, snapshot: &Snapshot) -> Result {
         self.find(view)?;
         self.announce(view, snapshot)?;
-        self.put(self.channels.scene, view.t_s, &scene(view))?;
+        self.put(self.channels.scene, view.t_s, &scene(view, &self.visibility))?;
         for (frame, cloud) in point_cloud::bodies(view) {
             let channel = self.add(topics::shape(&frame))?;
             self.put(channel, view.t_s, &cloud)?;
@@ -226,6 +233,7 @@ impl McapWriter {
         self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));
         self.drawn = vec![0; self.points.as_ref().map_or(0, GroundPoints::count)];
         self.forces = Forces::new(view, self.gravity_m_s2);
+        self.visibility = Visibility::find(view)?;
         Ok(())
     }
 
@@ -287,6 +295,7 @@ impl McapWriter {
     /// Writes variables, poses, forces, energy and gluing of a communication point.
     pub fn record(&mut self, view: &View, snapshot: &Snapshot) -> Result {
         self.transforms(view)?;
+        self.hidden(view)?;
         self.joint_states(view)?;
         let mut variables = std::mem::take(&mut self.variables);
         let written = snapshot.subsystems.iter().zip(&mut variables).try_for_each(|(scalars, parts)| {
@@ -305,6 +314,16 @@ impl McapWriter {
         self.put(self.channels.gluing, view.t_s, &step)?;
         self.window = WindowRecord::default();
         self.draw_forces(view)
+    }
+
+    /// Draws again the bodies of which another part is shown than before.
+    fn hidden(&mut self, view: &View) -> Result {
+        let changed = self.visibility.changed(view)?;
+        if changed.is_empty() {
+            return Ok(());
+        }
+        let scene = bodies(view, &self.visibility, changed.into_iter());
+        self.put(self.channels.scene, view.t_s, &scene)
     }
 
     fn write_variables(&mut self, t_s: f64, part: &mut Variables, all: &[f64]) -> Result {
@@ -328,7 +347,31 @@ impl McapWriter {
         self.forces_next_s = view.t_s + DRAWN_EVERY_S * (1.0 - 1e-6);
         let (arrows, points) = (self.forces.arrows(view), self.forces.points(view));
         self.put(self.channels.forces, view.t_s, &arrows)?;
-        self.put(self.channels.force_points, view.t_s, &points)
+        self.put(self.channels.force_points, view.t_s, &points)?;
+        self.draw_overlays(view)
+    }
+
+    fn draw_overlays(&mut self, view: &View) -> Result {
+        let Some(mut overlays) = self.overlays.take() else { return Ok(()) };
+        let written = overlays.read(view).into_iter().try_for_each(|(topic, shown)| {
+            let channel = match overlays.channel(&topic) {
+                Some(channel) => channel,
+                None => {
+                    // a run that goes on from a checkpoint announces its layers at the start of a chunk
+                    self.flush(view.t_s)?;
+                    self.layer(&mut overlays, topic)?
+                }
+            };
+            self.put(channel, view.t_s, &shown)
+        });
+        self.overlays = Some(overlays);
+        written
+    }
+
+    fn layer(&mut self, overlays: &mut Overlays, topic: String) -> Result<u16> {
+        let channel = self.add(overlays::topic(&topic))?;
+        overlays.add(topic, channel);
+        Ok(channel)
     }
 
     fn transforms(&mut self, view: &View) -> Result {

@@ -1,6 +1,7 @@
 //! The message of `/scene`: every body's shapes as primitives that viewers draw, locked to the body's frame.
 
 use crate::layout::timestamp;
+use crate::visibility::Visibility;
 use foxglove::messages::{
     Color, CubePrimitive, CylinderPrimitive, Duration, Point3, Pose, Quaternion, SceneEntity, SceneUpdate,
     SpherePrimitive, TriangleListPrimitive, Vector3,
@@ -23,33 +24,57 @@ pub(crate) fn quaternion(q: [f64; 4]) -> Quaternion {
     Quaternion { x: q[1], y: q[2], z: q[3], w: q[0] }
 }
 
+/// The rotation w, x, y, z that turns the x axis along a vector.
+pub(crate) fn along(v: [f64; 3], length: f64) -> [f64; 4] {
+    let [x, y, z] = v.map(|c| c / length);
+    let w = 1.0 + x;
+    if w < 1e-9 {
+        return [0.0, 0.0, 0.0, 1.0];
+    }
+    // Half the angle about x × v = (0, −z, y).
+    let norm = (w * w + y * y + z * z).sqrt();
+    [w / norm, 0.0, -z / norm, y / norm]
+}
+
 /// A pose as viewers write it.
 pub(crate) fn pose(pose: &OwnPose) -> Option<Pose> {
     let (position, orientation) = (vector(pose.position), quaternion(pose.orientation));
     Some(Pose { position: Some(position), orientation: Some(orientation) })
 }
 
-/// The shapes of all bodies.
-pub(crate) fn scene(view: &View) -> SceneUpdate {
-    let entities = view.subsystems.iter().flat_map(|s| {
-        s.scene.bodies.iter().enumerate().map(move |(k, body)| {
-            let shapes = || s.scene.shapes.iter().filter(move |shape| shape.body as usize == k);
-            let id = frame_id(s.name, &body.name);
-            SceneEntity {
-                timestamp: Some(timestamp(view.t_s)),
-                frame_id: id.clone(),
-                id,
-                lifetime: Some(Duration::new(0, 0)),
-                frame_locked: true,
-                cubes: shapes().filter_map(cube).collect(),
-                spheres: shapes().flat_map(spheres).collect(),
-                cylinders: shapes().filter_map(cylinder).collect(),
-                triangles: shapes().filter_map(mesh).collect(),
-                ..SceneEntity::default()
-            }
-        })
-    });
-    SceneUpdate { deletions: Vec::new(), entities: entities.collect() }
+/// The shown shapes of all bodies.
+pub(crate) fn scene(view: &View, visibility: &Visibility) -> SceneUpdate {
+    let subsystems = view.subsystems.iter().enumerate();
+    let all = subsystems.flat_map(|(s, of)| (0..of.scene.bodies.len()).map(move |body| (s, body)));
+    bodies(view, visibility, all)
+}
+
+/// The shown shapes of bodies, by the numbers of their subsystems and their own; they replace those before.
+pub(crate) fn bodies(
+    view: &View,
+    visibility: &Visibility,
+    which: impl Iterator<Item = (usize, usize)>,
+) -> SceneUpdate {
+    let entity = |(subsystem, body): (usize, usize)| {
+        let s = &view.subsystems[subsystem];
+        let all = s.scene.shapes.iter().enumerate();
+        let own = all.filter(|(k, shape)| shape.body as usize == body && visibility.shows(subsystem, *k));
+        let shapes: Vec<&SceneShape> = own.map(|(_, shape)| shape).collect();
+        let id = frame_id(s.name, &s.scene.bodies[body].name);
+        SceneEntity {
+            timestamp: Some(timestamp(view.t_s)),
+            frame_id: id.clone(),
+            id,
+            lifetime: Some(Duration::new(0, 0)),
+            frame_locked: true,
+            cubes: shapes.iter().filter_map(|s| cube(s)).collect(),
+            spheres: shapes.iter().flat_map(|s| spheres(s)).collect(),
+            cylinders: shapes.iter().filter_map(|s| cylinder(s)).collect(),
+            triangles: shapes.iter().filter_map(|s| mesh(s)).collect(),
+            ..SceneEntity::default()
+        }
+    };
+    SceneUpdate { deletions: Vec::new(), entities: which.map(entity).collect() }
 }
 
 /// Red, green, blue of a shape: what touches the ground stands out.

@@ -16,6 +16,8 @@ pub enum Kind {
     Controller,
     /// Pressure and shear of a soil.
     Law,
+    /// What looks at the others.
+    Sensor,
 }
 
 /// In which language.
@@ -35,7 +37,7 @@ pub enum Language {
 
 impl Kind {
     /// All, in the order in which they are listed.
-    pub const ALL: [Self; 4] = [Self::Soil, Self::Robot, Self::Controller, Self::Law];
+    pub const ALL: [Self; 5] = [Self::Soil, Self::Robot, Self::Controller, Self::Law, Self::Sensor];
 
     /// As a word of the command line.
     pub fn word(self) -> &'static str {
@@ -44,6 +46,7 @@ impl Kind {
             Self::Robot => "robot",
             Self::Controller => "controller",
             Self::Law => "law",
+            Self::Sensor => "sensor",
         }
     }
 
@@ -53,6 +56,7 @@ impl Kind {
             Self::Robot => "It starts as a ball that falls and rests with T* = m g.",
             Self::Controller => "It starts as a motor target that goes smoothly to a set-point.",
             Self::Law => "It starts as Bekker's law that stiffens with the depth.",
+            Self::Sensor => "It starts as a range finder on the arm of a robot.",
         }
     }
 
@@ -68,6 +72,9 @@ impl Kind {
                 format!("Your control law goes into `control` of `{source}`: inputs in, outputs out.")
             }
             Self::Law => format!("Your physics goes into `pressure` and `shear` of `{source}`."),
+            Self::Sensor => {
+                format!("Your measurement goes into `measure` of `{source}`: what is seen in, outputs out.")
+            }
         }
     }
 }
@@ -145,6 +152,16 @@ fn source(kind: Kind, language: Language) -> Option<File> {
         (Kind::Law, Language::Rust) => ("src/lib.rs", "the law", include_str!("templates/law.rs.in")),
         (Kind::Law, Language::C) => ("my_module.c", "the law", include_str!("templates/law.c.in")),
         (Kind::Law, Language::Cpp) => ("my_module.cpp", "the law", include_str!("templates/law.cpp.in")),
+        (Kind::Sensor, Language::Python) => {
+            ("my_module.py", "the sensor", include_str!("templates/sensor.py.in"))
+        }
+        (Kind::Sensor, Language::Rust) => {
+            ("src/lib.rs", "the sensor", include_str!("templates/sensor.rs.in"))
+        }
+        (Kind::Sensor, Language::C) => ("my_module.c", "the sensor", include_str!("templates/sensor.c.in")),
+        (Kind::Sensor, Language::Cpp) => {
+            ("my_module.cpp", "the sensor", include_str!("templates/sensor.cpp.in"))
+        }
         (Kind::Soil, Language::Rust) => ("src/lib.rs", "the soil", include_str!("templates/soil.rs.in")),
         (Kind::Soil, Language::C) => ("my_module.c", "the soil", include_str!("templates/soil.c.in")),
         (Kind::Soil, Language::Cpp) => ("my_module.cpp", "the soil", include_str!("templates/soil.cpp.in")),
@@ -189,6 +206,9 @@ fn scenario(kind: Kind, language: Language) -> &'static [File] {
             ("scenario.toml", "it moves an arm", include_str!("templates/scenario-controller.toml.in")),
             ARM,
         ],
+        Kind::Sensor => {
+            &[("scenario.toml", "it sits on an arm", include_str!("templates/scenario-sensor.toml.in")), ARM]
+        }
     }
 }
 

@@ -283,6 +283,13 @@ fn recording() -> Table {
             "variables or groups that are recorded, `robot.*.angle` or `robot.LF_j2`; all where absent",
         ),
         patterns("exclude", "variables or groups that are not"),
+        Parameter::of(
+            "overlays",
+            ParameterType::Bool,
+            "also what subsystems and the gluing show beside the bodies: pressure under feet, friction cones, footholds, …",
+        )
+        .or(false)
+        .into(),
     ];
     of("recording", "Contents of `recording.mcap`.", keys)
 }
@@ -301,8 +308,8 @@ fn report() -> Table {
 fn connect() -> Table {
     let text = |name, help| Parameter::of(name, ParameterType::Text, help);
     let keys = vec![
-        text("from", "`subsystem.variable`, an array or an element of one (`feet.position[2,1]`); each `*` matches within one dotted part").into(),
-        text("to", "the same; its `*` take what matched in `from`").into(),
+        text("from", "`subsystem.variable`, an array or an element of one (`feet.position[2,1]`), or `subsystem.stream`; each `*` matches within one dotted part").into(),
+        text("to", "the input, which takes bytes where `from` is a stream; its `*` take what matched in `from`").into(),
         number("factor", "", 1.0, "to = factor · from + offset, after the conversion of units").into(),
         number("offset", "", 0.0, "see `factor`").into(),
         Parameter::of("convert", ParameterType::Bool, "false: units are neither converted nor compared")
@@ -394,13 +401,24 @@ fn fault() -> Table {
     let seconds = |name, help| required(name, "s", help).within(0.0, f64::INFINITY);
     let value = required("value", "", "override: the value; offset: is added; gain: the factor");
     let keys = vec![
-        text("variable", "`subsystem.variable`: an output on all its connections, or an input").into(),
+        text(
+            "variable",
+            "`subsystem.variable`: an output on all its connections, or an input; or `subsystem.stream`",
+        )
+        .into(),
         text("kind", "what is wrong with its number").choices(FAULTS).into(),
         Key::from(value).only(&["override", "offset", "gain"]),
         Key::from(required("rate_per_s", "", "what is added grows by this")).only(&["ramp"]),
         Key::from(required("delay_s", "s", "how old the number is").positive()).only(&["delay"]),
-        Key::from(required("probability", "", "of each step that the last number stays").within(0.0, 1.0))
-            .only(&["drop-out"]),
+        Key::from(
+            required(
+                "probability",
+                "",
+                "of each step that the last number stays, of each message of a stream that it is lost",
+            )
+            .within(0.0, 1.0),
+        )
+        .only(&["drop-out"]),
         Key::from(
             required("deviation", "", "standard deviation of what is added").within(0.0, f64::INFINITY),
         )

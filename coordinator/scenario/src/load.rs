@@ -90,6 +90,7 @@ impl Scenario {
             Ok(RecordingSpec {
                 every_steps: s.count("every_steps"),
                 ground_every_steps: s.count("ground_every_steps"),
+                overlays: s.value("overlays") == serde_json::Value::Bool(true),
                 digits: s.count("digits"),
                 include: s.entry("include").map(subsystems::texts).unwrap_or_default(),
                 exclude: s.entry("exclude").map(subsystems::texts).unwrap_or_default(),

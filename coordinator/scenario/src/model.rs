@@ -194,6 +194,8 @@ pub struct RecordingSpec {
     pub ground_every_steps: u64,
     /// Every how many steps variables and poses are written.
     pub every_steps: u64,
+    /// Whether overlays are written.
+    pub overlays: bool,
     /// Significant digits of what is recorded.
     pub digits: u64,
     /// Patterns of the variables that are recorded; all where empty.

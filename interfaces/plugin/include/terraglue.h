@@ -88,6 +88,8 @@
 #define TG_CAN_FIXED_STEP 4096
 /* Bit of `capabilities`: `observe`. Since 3.1. */
 #define TG_CAN_SEE 8192
+/* Bit of `capabilities`: `shape_visibility`. Since 3.1. */
+#define TG_CAN_HIDE 16384
 /* `tg_port.kind`: one body shape on one ground, unilateral. */
 #define TG_CONTACT 0
 /* `tg_port.kind`: a cut joint, bilateral. */
@@ -908,7 +910,8 @@ typedef struct {
     const char *layer;
     /* What a text says; else null. */
     const char *text;
-    /* Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world. */
+    /* Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world, UINT32_MAX - 1: the body that
+     * the parameter `mount` names. */
     uint32_t frame;
     /* TG_LINES ... TG_TEXT. */
     uint32_t figure;
@@ -1078,8 +1081,8 @@ typedef struct {
      * are unknown.
      * When: at any time after `instantiate`. Thread: that of the instance. */
     size_t (*shape_materials)(void *instance, const tg_material **first);
-    /* For each of the scene's n shapes 1 where it is shown, 0 where it is hidden; it belongs to the committed state.
-     * Null: all are shown.
+    /* For each of the scene's n shapes 1 where it is shown, 0 where it is hidden; it belongs to the committed state. Asked with
+     * the capability TG_CAN_HIDE; without it all are shown.
      * When: at any time. Thread: that of the instance. */
     tg_status (*shape_visibility)(void *instance, size_t n, uint8_t *out);
     /* All streams, and their number; valid and constant until `free`.

@@ -15,7 +15,7 @@ import struct
 
 # What an instance can do beyond `advance`: the sum stands in `Subsystem.can`.
 FORCE, MOTION, ESTIMATE, SOLVE, DERIVATIVES, RETRY = 1, 2, 8, 16, 32, 64
-SUBCYCLES, FEEDTHROUGH, SEES = 512, 1024, 8192
+SUBCYCLES, FEEDTHROUGH, SEES, HIDES = 512, 1024, 8192, 16384
 # Roles of a variable, what a change of it does, and the types of its elements.
 PARAMETER, INPUT, OUTPUT, LOCAL = range(4)
 LIVE, NEEDS_RESET, READ_ONLY = range(3)
@@ -192,8 +192,10 @@ class Stream:
 
 class Overlay:
     """Shown beside the bodies in a layer. figure: "lines", "points", "arrows" (data: points; size: width), "ellipse" (data:
-    position, orientation, half lengths) or "text" (data: position, text; size: height); frame: place of a body, None: world."""
+    position, orientation, half lengths) or "text" (data: position, text; size: height); frame: place of a body, None: world, MOUNT: the body that the
+    parameter `mount` names."""
 
+    MOUNT = 0xFFFFFFFE
     FIGURES = ("lines", "points", "arrows", "ellipse", "text")
 
     def __init__(self, layer, figure, data, size=0.01, colour=(1.0, 1.0, 1.0, 1.0), frame=None):
@@ -400,7 +402,7 @@ class Subsystem:
         at t + h. At the start of a run step.h = 0."""
 
     def shape_visibility(self):
-        """For each of `shapes` whether it is shown; None: all are."""
+        """With HIDES in `can`: for each of `shapes` whether it is shown; None: all are."""
         return None
 
     def stream(self, k):

@@ -293,7 +293,12 @@ class Worker:
     def _messages(self, reply):
         """What the last step made on the streams."""
         for k in range(len(self.subsystem.streams)):
-            message = self.subsystem.stream(k)
+            try:
+                message = self.subsystem.stream(k)
+            except Exception as e:  # the host tells it as the failure of `stream`
+                reply.u8(2)
+                reply.text(str(e) or type(e).__name__)
+                continue
             reply.u8(message is not None)
             if message is not None:
                 reply.numbers(message[0])

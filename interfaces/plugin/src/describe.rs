@@ -3,7 +3,7 @@
 use terraglue_subsystem::{Capabilities, LawModule, Variable};
 
 /// What an instance can do, as words.
-pub const WORDS: [(Capabilities, &str); 12] = [
+pub const WORDS: [(Capabilities, &str); 13] = [
     (Capabilities::FORCE, "force"),
     (Capabilities::MOTION, "motion"),
     (Capabilities::ESTIMATE, "estimate"),
@@ -16,6 +16,7 @@ pub const WORDS: [(Capabilities, &str); 12] = [
     (Capabilities::FEEDTHROUGH, "feedthrough"),
     (Capabilities::FIXED_STEP, "fixed-step"),
     (Capabilities::SEES, "sees"),
+    (Capabilities::HIDES, "hides"),
 ];
 
 /// The words of a set of capabilities.

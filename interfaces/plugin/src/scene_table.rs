@@ -168,11 +168,7 @@ unsafe fn shape_in(s: &TgShape, material: Option<&TgMaterial>, bodies: u32) -> R
     });
     // SAFETY: by the contract.
     let geometry = unsafe { geometry(s, &name)? };
-    let wrong = material.wrong().or_else(|| geometry.cannot_collide().filter(|_| s.collides != 0));
-    if let Some(why) = wrong {
-        return Err(Error::Fatal(format!("the shape `{name}`: {why}")));
-    }
-    Ok(SceneShape {
+    let shape = SceneShape {
         id: s.id,
         body: s.body,
         geometry,
@@ -180,7 +176,11 @@ unsafe fn shape_in(s: &TgShape, material: Option<&TgMaterial>, bodies: u32) -> R
         body_from_shape: pose_in(&s.body_from_shape),
         collides: s.collides != 0,
         material,
-    })
+    };
+    match shape.wrong() {
+        Some(why) => Err(Error::Fatal(format!("the shape `{}`: {why}", shape.name))),
+        None => Ok(shape),
+    }
 }
 
 /// # Safety

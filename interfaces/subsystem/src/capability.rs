@@ -29,9 +29,11 @@ impl Capabilities {
     pub const FIXED_STEP: Self = Self(4096);
     /// `observe` is implemented.
     pub const SEES: Self = Self(8192);
+    /// `shape_visibility` is implemented; without it all shapes are shown and nobody asks.
+    pub const HIDES: Self = Self(16384);
 
     /// All names, for messages and listings.
-    pub const NAMES: [(Self, &'static str); 12] = [
+    pub const NAMES: [(Self, &'static str); 13] = [
         (Self::FORCE, "force input"),
         (Self::MOTION, "motion input"),
         (Self::ESTIMATE, "estimate_forces"),
@@ -44,6 +46,7 @@ impl Capabilities {
         (Self::FEEDTHROUGH, "direct feed-through"),
         (Self::FIXED_STEP, "steps of one length only"),
         (Self::SEES, "sight"),
+        (Self::HIDES, "shapes that can be hidden"),
     ];
 
     /// Whether all of `other` is in this set.

@@ -7,7 +7,8 @@ use crate::pose::Pose;
 pub struct Overlay {
     /// Name of the layer, e.g. `support polygon`; unique words, no dots.
     pub layer: String,
-    /// Index of the body of the own scene in whose frame the figure lies; [`Overlay::WORLD`]: the world.
+    /// Index of the body of the own scene in whose frame the figure lies; [`Overlay::WORLD`]: the world,
+    /// [`Overlay::MOUNT`]: the body of another subsystem that the parameter `mount` names.
     pub frame: u32,
     /// Red, green, blue, opacity, 0 … 1.
     pub colour: [f32; 4],
@@ -18,6 +19,8 @@ pub struct Overlay {
 impl Overlay {
     /// The frame of what lies in the world.
     pub const WORLD: u32 = u32::MAX;
+    /// The frame of the body that the parameter [`crate::Mount::KEY`] names, without the offset.
+    pub const MOUNT: u32 = u32::MAX - 1;
 }
 
 /// What an overlay draws; lengths in m.

@@ -99,6 +99,13 @@ pub struct SceneShape {
     pub material: Material,
 }
 
+impl SceneShape {
+    /// Why nobody can see or hit this shape; none where it makes sense.
+    pub fn wrong(&self) -> Option<&'static str> {
+        self.material.wrong().or_else(|| self.geometry.cannot_collide().filter(|_| self.collides))
+    }
+}
+
 /// All bodies, shapes and joints of a subsystem; constant over the life of an instance.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Scene {

@@ -1,4 +1,7 @@
 //! Streams: what a subsystem gives that is no variable, such as point clouds, images and maps.
+//!
+//! A stream can feed an input of the type [`crate::ValueType::Binary`] of another subsystem: each message is one
+//! [`crate::Subsystem::set`] at the start of the step after the one that made it.
 
 /// A stream of messages of one kind.
 #[derive(Clone, Debug, PartialEq)]

@@ -216,8 +216,8 @@ pub trait Subsystem: Send {
     }
 
     /// Which of the scene's shapes are shown, in its order; the others are neither drawn nor seen until they are shown again.
-    /// It belongs to the committed state, which `save_state` and `serialize` keep. By default all are shown. Contact with soil
-    /// does not ask for it.
+    /// It belongs to the committed state, which `save_state` and `serialize` keep. Asked of an instance with
+    /// [`Capabilities::HIDES`]; of any other all are shown. Contact with soil does not ask for it.
     ///
     /// # Errors
     /// [`Error::Failed`]: it cannot be told.

@@ -68,7 +68,8 @@ pub trait World {
     /// is emptied before.
     fn overlap(&self, centre: [f64; 3], radius: f64, mask: &RayMask, found: &mut Vec<ShapeRef>);
 
-    /// Fields of a subsystem; empty: it has none.
+    /// Fields of a subsystem as committed at t + h; empty: it has none. Those of a subsystem that sees itself are not shown, as
+    /// they may change while the world is looked at.
     fn fields(&self, _subsystem: u32) -> &[FieldInfo] {
         &[]
     }

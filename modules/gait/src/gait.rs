@@ -1,14 +1,15 @@
 //! The subsystem: trials, commits, snapshots and variables around the walker.
 
 use crate::command::Command;
+use crate::overlays;
 use crate::parameters::{Settings, schema, settings};
 use crate::variables;
 use crate::walker::Walker;
 use std::sync::Arc;
 use terraglue_subsystem::bytes;
 use terraglue_subsystem::{
-    Capabilities, Config, Error, Host, Input, Module, Motion, Response, Result, Schema, Step, Subsystem,
-    Values, ValuesMut, Variable,
+    Capabilities, Config, Error, Host, Input, Module, Motion, Overlay, Response, Result, Schema, Step,
+    Subsystem, Values, ValuesMut, Variable,
 };
 
 /// Version of its states as bytes.
@@ -112,6 +113,12 @@ impl Subsystem for Gait {
         let (walker, command) = bytes::open(VERSION, 0, from)?;
         (self.committed, self.trial, self.command) = (walker, walker, command);
         Ok(())
+    }
+
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        if self.settings.mounted {
+            overlays::of(&self.committed, &self.settings, out);
+        }
     }
 
     fn variables(&self) -> &[Variable] {

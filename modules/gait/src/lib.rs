@@ -27,6 +27,7 @@ pub mod foot;
 mod gait;
 pub mod geometry;
 pub mod load;
+mod overlays;
 mod parameters;
 pub mod pattern;
 pub mod plane;

@@ -6,7 +6,7 @@ use crate::geometry::{LEGS, Leg};
 use crate::pattern::{NAMES, Pattern};
 use crate::posture::Gains;
 use std::f64::consts::FRAC_PI_2;
-use terraglue_subsystem::{Config, Error, Kind, Parameter, ParameterType, Result, Schema};
+use terraglue_subsystem::{Config, Error, Kind, Mount, Parameter, ParameterType, Result, Schema};
 
 /// What stays the same over a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,8 @@ pub struct Settings {
     pub turn_acceleration: f64,
     /// Feedback.
     pub gains: Gains,
+    /// Whether it knows the body that it walks by name, to show something in its frame.
+    pub mounted: bool,
     cycle_s: Option<f64>,
     duty: Option<f64>,
 }
@@ -55,6 +57,9 @@ pub fn schema() -> Schema {
     parameters.extend(ground());
     parameters.extend(geometry());
     parameters.extend(feedback());
+    let help =
+        "Body that it walks, SUBSYSTEM.BODY, in whose frame it shows overlays; none are shown without it";
+    parameters.push(Parameter::of(Mount::KEY, ParameterType::Text, help).optional());
     Schema {
         name: "gait".into(),
         kind: Kind::Controller,
@@ -169,6 +174,7 @@ pub fn settings(config: &Config) -> Result<(Settings, Command)> {
         acceleration: number("acceleration_m_s2")?,
         turn_acceleration: number("turn_acceleration_rad_s2")?,
         gains,
+        mounted: config.text(Mount::KEY).is_ok(),
         cycle_s: config.optional_number("cycle_s")?,
         duty: config.optional_number("duty")?,
     };

@@ -6,8 +6,8 @@ use crate::measure::{self, Before, Truth};
 use crate::settings::{self, Settings};
 use std::sync::Arc;
 use terraglue_subsystem::{
-    Capabilities, Config, Error, Host, Input, Module, Motion, Response, Result, Schema, Step, Subsystem,
-    ValueType, Values, ValuesMut, Variable, World, bytes, persist,
+    Capabilities, Config, Error, Figure, Host, Input, Module, Motion, Overlay, Pose, Response, Result,
+    Schema, Step, Subsystem, ValueType, Values, ValuesMut, Variable, World, bytes, persist,
 };
 
 /// Form of the serialized state.
@@ -154,6 +154,23 @@ impl Subsystem for Sensor {
         }
         self.show(step.t + step.h, step.h);
         Ok(())
+    }
+
+    /// The ray of a range finder, as far as it tells, in the frame of its body.
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        let Some(mount) = self.settings.mount.as_ref() else { return };
+        if self.settings.kind != SensorKind::RangeFinder {
+            return;
+        }
+        let (Pose { position, .. }, reach) = (mount.body_from_sensor(), self.state.shown[0]);
+        let along = mount.body_from_sensor().turned([reach, 0.0, 0.0]);
+        let points = vec![*position, [0, 1, 2].map(|k| position[k] + along[k])];
+        out.push(Overlay {
+            layer: "ray".into(),
+            frame: Overlay::MOUNT,
+            colour: [0.9, 0.1, 0.2, 1.0],
+            figure: Figure::Lines { points, width: 0.004 },
+        });
     }
 
     fn save_state(&mut self, slot: u32) -> Result {

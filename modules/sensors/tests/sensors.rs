@@ -207,3 +207,28 @@ fn what_makes_no_sense_is_refused() {
     assert!(encoder.get(&[16], ValuesMut::Bool(&mut [false])).is_err());
     assert!(encoder.restore_state(0).is_err() && encoder.save_state(99).is_err());
 }
+
+#[test]
+fn a_range_finder_shows_its_ray_in_the_frame_of_its_body() {
+    let down = std::f64::consts::FRAC_1_SQRT_2;
+    let text = format!(
+        r#"{{"kind": "range-finder", "mount": "robot.body", "mount_offset": [0.1, 0, -0.5, {down}, 0, {down}, 0], "rate_hz": 0}}"#
+    );
+    let mut finder = sensor(&text);
+    finder.observe(&Step::free(0.0, H, 0), &Flight::at(0.0, H)).unwrap();
+    let distance = get(&*finder, "distance");
+    assert!((distance - (UP + H - 0.5)).abs() < 1e-9, "{distance}");
+    let mut all = Vec::new();
+    finder.overlays(&mut all);
+    let [Overlay { frame: Overlay::MOUNT, figure: Figure::Lines { points, .. }, .. }] = &all[..] else {
+        panic!("one ray: {all:?}")
+    };
+    let tip = [0.1, 0.0, -0.5 - distance];
+    assert!(
+        points[0] == [0.1, 0.0, -0.5] && (0..3).all(|k| (points[1][k] - tip[k]).abs() < 1e-9),
+        "{points:?}"
+    );
+    let mut none = Vec::new();
+    sensor(r#"{"kind": "imu", "mount": "robot.body"}"#).overlays(&mut none);
+    assert!(none.is_empty());
+}

@@ -5,12 +5,12 @@ use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
 use crate::fixture::outputs;
 use crate::scope::{Area, Level};
-use crate::test_context::TestContext;
+use crate::test_context::{MOUNTED, TestContext};
 use std::cell::Cell;
 use terraglue_host::{Instance, message, observe};
 use terraglue_subsystem::{
     BodyRef, BodyState, Capabilities, Input, Kind, Motion, Pose, Ray, RayHit, RayMask, Response, Scene,
-    ShapeRef, Step, World,
+    SceneBody, ShapeRef, Step, World,
 };
 
 const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
@@ -43,7 +43,9 @@ struct Plane {
 
 impl Plane {
     fn new(start: f64, end: f64) -> Self {
-        let (names, scene) = (vec!["others".into()], Scene::default());
+        let (subsystem, body) = MOUNTED.split_once('.').unwrap_or_default();
+        let bodies = vec![SceneBody { name: body.into(), mass: 1.0 }];
+        let (names, scene) = (vec![subsystem.into()], Scene { bodies, ..Scene::default() });
         Self { names, scene, interval: [start, end], latest: Cell::new(f64::NEG_INFINITY) }
     }
 

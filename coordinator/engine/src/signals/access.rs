@@ -19,6 +19,17 @@ pub struct VariableRef {
 pub struct Directory {
     names: Vec<String>,
     refs: Vec<VariableRef>,
+    /// Full names of all streams, in the order in which they are counted.
+    streams: Vec<String>,
+}
+
+/// Full names (`subsystem.stream`) of all streams with the slots of their subsystems and their numbers in them, in the
+/// order in which they are counted.
+pub fn streams(instances: &[Instance]) -> impl Iterator<Item = (String, (usize, usize))> {
+    instances.iter().enumerate().flat_map(|(slot, instance)| {
+        let all = instance.subsystem().streams().iter().enumerate();
+        all.map(move |(k, info)| (format!("{}.{}", instance.name(), info.name), (slot, k)))
+    })
 }
 
 impl Directory {
@@ -31,7 +42,13 @@ impl Directory {
                 directory.refs.push(VariableRef { slot, variable });
             }
         }
+        directory.streams = streams(instances).map(|(name, _)| name).collect();
         directory
+    }
+
+    /// Full names of all streams, in the order in which they are counted.
+    pub fn streams(&self) -> &[String] {
+        &self.streams
     }
 
     /// All full names, in the order of instances and variables.
@@ -44,16 +61,25 @@ impl Directory {
         self.names.iter().position(|n| n == name).map(|k| self.refs[k])
     }
 
-    /// A line of help for a name that does not exist: the one that looks most like it.
+    /// A line of help for a variable that does not exist: the one that looks most like it.
     pub fn hint(&self, name: &str) -> Option<String> {
-        let distance = |n: &&String| strsim::damerau_levenshtein(n, name);
-        self.names.iter().min_by_key(distance).map(|n| format!("did you mean `{n}`?"))
+        nearest(self.names.iter(), name)
+    }
+
+    /// The same where the name may be that of a stream.
+    pub fn hint_with_streams(&self, name: &str) -> Option<String> {
+        nearest(self.names.iter().chain(&self.streams), name)
     }
 
     /// Names and variables in order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, VariableRef)> {
         self.names.iter().map(String::as_str).zip(self.refs.iter().copied())
     }
+}
+
+fn nearest<'a>(names: impl Iterator<Item = &'a String>, name: &str) -> Option<String> {
+    let distance = |n: &&String| strsim::damerau_levenshtein(n, name);
+    names.min_by_key(distance).map(|n| format!("did you mean `{n}`?"))
 }
 
 impl VariableRef {

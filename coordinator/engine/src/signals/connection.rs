@@ -3,6 +3,7 @@
 use super::access::{Directory, VariableRef};
 use super::discrete::{self, Discrete};
 use super::pattern;
+use super::stream_link::{self, StreamLink};
 use super::table;
 use terraglue_diagnostics::Result;
 use terraglue_host::{Instance, Reply};
@@ -153,6 +154,8 @@ pub struct Links {
     pub numbers: Vec<Link>,
     /// Of all other types.
     pub discrete: Vec<Discrete>,
+    /// Of streams.
+    pub streams: Vec<StreamLink>,
 }
 
 /// Name without the index of an element at its end, and that index: `a.b[2,1]` → `a.b`, `[2,1]`.
@@ -189,56 +192,117 @@ fn shapes_differ(directory: &Directory, name: &str, target: &str) -> Option<Stri
 /// Resolves all connections of a scenario into links, in the order of the file.
 ///
 /// # Errors
-/// A connection that matches no variable, names one that does not exist, joins values that do not fit, or feeds an input twice.
+/// A connection that matches nothing, names a variable that does not exist, joins what does not fit, or feeds an input twice.
 pub fn connect(
     connections: &[Connection],
     directory: &Directory,
     instances: &[Instance],
     source: &Source,
 ) -> std::result::Result<Links, Box<InputError>> {
-    let mut links = Links::default();
-    let mut fed: Vec<(String, VariableRef)> = Vec::new();
+    let mut resolving = Resolving { directory, instances, source, links: Links::default(), fed: Vec::new() };
     for connection in connections {
+        let variables = resolving.variables(connection)?;
+        let streams = resolving.streams(connection)?;
+        if !variables && !streams {
+            let message = format!("no variable and no stream matches `{}`", connection.from);
+            let help = directory.hint_with_streams(&connection.from);
+            return Err(resolving.refuse(connection, &connection.from, message, help));
+        }
+    }
+    Ok(resolving.links)
+}
+
+/// Connections on their way into links.
+struct Resolving<'a> {
+    directory: &'a Directory,
+    instances: &'a [Instance],
+    source: &'a Source,
+    links: Links,
+    /// Inputs that are fed, and by what.
+    fed: Vec<(String, VariableRef)>,
+}
+
+impl Resolving<'_> {
+    fn refuse(
+        &self,
+        connection: &Connection,
+        end: &str,
+        message: String,
+        help: Option<String>,
+    ) -> Box<InputError> {
+        self.source.error_in(connection.entry, &[end], message, help)
+    }
+
+    fn find(
+        &self,
+        connection: &Connection,
+        name: &str,
+        target: &str,
+    ) -> std::result::Result<VariableRef, Box<InputError>> {
+        self.directory.find(target).ok_or_else(|| {
+            let message = format!("`{name}` is connected to `{target}`, which does not exist");
+            self.refuse(connection, &connection.to, message, self.directory.hint(target))
+        })
+    }
+
+    /// Takes an input, which nothing else may feed.
+    fn feed(
+        &mut self,
+        connection: &Connection,
+        name: &str,
+        (target, to): (&str, VariableRef),
+    ) -> std::result::Result<(), Box<InputError>> {
+        if let Some((other, _)) = self.fed.iter().find(|(_, input)| *input == to) {
+            let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
+            let help =
+                "an input takes one number: delete one of the two, or let a module add them up".to_owned();
+            return Err(self.refuse(connection, &connection.to, message, Some(help)));
+        }
+        self.fed.push((name.to_owned(), to));
+        Ok(())
+    }
+
+    /// All variables that a connection names; false: it names none.
+    fn variables(&mut self, connection: &Connection) -> std::result::Result<bool, Box<InputError>> {
+        let (directory, instances) = (self.directory, self.instances);
         let mut matched = false;
-        let refuse = |end: &str, message: String, help: Option<String>| {
-            source.error_in(connection.entry, &[end], message, help)
-        };
         for (name, from) in directory.iter() {
             let Some((target, of_array)) = target(connection, name) else { continue };
             matched = true;
             if let Some(message) = of_array.then(|| shapes_differ(directory, name, &target)).flatten() {
-                return Err(refuse(&connection.to, message, None));
+                return Err(self.refuse(connection, &connection.to, message, None));
             }
-            let to = directory.find(&target).ok_or_else(|| {
-                let message = format!("`{name}` is connected to `{target}`, which does not exist");
-                refuse(&connection.to, message, directory.hint(&target))
-            })?;
+            let to = self.find(connection, name, &target)?;
             let conversion = check(connection, instances, (name, from), (&target, to))
-                .map_err(|message| refuse(&connection.to, message, None))?;
-            if let Some((other, _)) = fed.iter().find(|(_, input)| *input == to) {
-                let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
-                let help = "an input takes one number: delete one of the two, or let a module add them up"
-                    .to_owned();
-                return Err(refuse(&connection.to, message, Some(help)));
+                .map_err(|message| self.refuse(connection, &connection.to, message, None))?;
+            self.feed(connection, name, (&target, to))?;
+            if from.describe(instances).value_type == ValueType::F64 {
+                add(&mut self.links.numbers, instances, from, to, conversion);
+                continue;
             }
-            fed.push((name.to_owned(), to));
-            match from.describe(instances).value_type {
-                ValueType::F64 => add(&mut links.numbers, instances, from, to, conversion),
-                _ => {
-                    let table = table::resolve(&connection.map, instances, from, to).map_err(|message| {
-                        refuse("map", format!("`{name}` → `{target}`: {message}"), None)
-                    })?;
-                    links.discrete.push(Discrete::new(from, to, table, conversion));
-                }
-            }
+            let table = table::resolve(&connection.map, instances, from, to).map_err(|message| {
+                self.refuse(connection, "map", format!("`{name}` → `{target}`: {message}"), None)
+            })?;
+            self.links.discrete.push(Discrete::new(from, to, table, conversion));
         }
-        if !matched {
-            let message = format!("no variable matches `{}`", connection.from);
-            let help = directory.hint(&connection.from);
-            return Err(refuse(&connection.from, message, help));
-        }
+        Ok(matched)
     }
-    Ok(links)
+
+    /// All streams that a connection names; false: it names none.
+    fn streams(&mut self, connection: &Connection) -> std::result::Result<bool, Box<InputError>> {
+        let directory = self.directory;
+        let mut matched = false;
+        for (number, name) in directory.streams().iter().enumerate() {
+            let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) else { continue };
+            matched = true;
+            let to = self.find(connection, name, &target)?;
+            stream_link::check(connection, self.instances, name, (&target, to))
+                .map_err(|message| self.refuse(connection, &connection.to, message, None))?;
+            self.feed(connection, name, (&target, to))?;
+            self.links.streams.push(StreamLink::new(number, to));
+        }
+        Ok(matched)
+    }
 }
 
 /// value_to = a·value_from + b, or why the two cannot be connected.

@@ -2,12 +2,14 @@
 //!
 //! A fault of an output changes the number on every connection that leaves it, in the unit of the output; the output
 //! itself, and its recording, stay true. A fault of an input changes what it is given: over its connection, or, where it
-//! has none, what it was set to. Begin and end at a time are met exactly, because steps end there.
+//! has none, what it was set to. Messages of a stream can be lost (drop-out) or frozen, on all connections that leave it or on
+//! the one of an input. Begin and end at a time are met exactly, because steps end there.
 
 use super::access::{Directory, VariableRef};
-use super::connection::Link;
+use super::connection::{Link, Links};
 use super::event::Resolved;
 use super::modifier::Modifier;
+use super::stream_link::StreamLink;
 use serde_json::Value;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_gluing::memory::{Recall, Remember};
@@ -25,6 +27,21 @@ struct Entry {
     modifier: Modifier,
 }
 
+/// A connection of a stream whose messages a fault changes.
+#[derive(Debug)]
+struct Messages {
+    link: usize,
+    modifier: Modifier,
+}
+
+/// Where a fault acts.
+#[derive(Debug, Default)]
+struct Places {
+    entries: Vec<Entry>,
+    messages: Vec<Messages>,
+    own: Option<Own>,
+}
+
 /// An input without a connection.
 #[derive(Debug)]
 struct Own {
@@ -40,8 +57,7 @@ struct Fault {
     label: String,
     begin: Resolved,
     end: EndCondition,
-    entries: Vec<Entry>,
-    own: Option<Own>,
+    places: Places,
     /// Since when it is there, s.
     since: Option<f64>,
     over: bool,
@@ -70,7 +86,7 @@ impl Faults {
     /// A variable that does not exist or that no fault can change.
     pub fn new(
         specs: &[FaultSpec],
-        links: &[Link],
+        links: &Links,
         directory: &Directory,
         instances: &[Instance],
         source: &Source,
@@ -84,11 +100,13 @@ impl Faults {
                 let missing = || refuse((format!("variable `{name}` does not exist"), directory.hint(name)));
                 directory.find(name).ok_or_else(missing)
             };
-            let variable = find(&spec.variable)?;
             let seed = spec.seed.unwrap_or_else(|| seed ^ (number as u64 + 1).rotate_left(32));
             let modifier = Modifier::new(spec.kind, seed, h);
-            let (entries, own) = place(variable, links, instances, &modifier)
-                .map_err(|why| refuse((format!("`{}` {why}", spec.variable), None)))?;
+            let places = match directory.streams().iter().position(|name| *name == spec.variable) {
+                Some(stream) => of_stream(|l| l.stream() == stream, links, &modifier),
+                None => place(find(&spec.variable)?, links, instances, &modifier),
+            };
+            let places = places.map_err(|why| refuse((format!("`{}` {why}", spec.variable), None)))?;
             Ok(Fault {
                 label: format!("{} of {}", spec.kind.name(), spec.variable),
                 begin: Resolved::new(&spec.start, find)?,
@@ -97,8 +115,7 @@ impl Faults {
                     FaultEnd::At(trigger) => EndCondition::Trigger(Resolved::new(trigger, find)?),
                     FaultEnd::After(duration) => EndCondition::After(*duration),
                 },
-                entries,
-                own,
+                places,
                 since: None,
                 over: false,
             })
@@ -129,14 +146,14 @@ impl Faults {
     pub fn apply(
         &mut self,
         (t, h): (f64, f64),
-        links: &mut [Link],
+        links: &mut Links,
         instances: &mut [Instance],
         mut tell: impl FnMut(Change),
     ) -> Result {
         for fault in &mut self.all {
-            fault.see(t, links, instances);
+            fault.see(t, &links.numbers, instances);
             if !fault.over && fault.since.is_none() && fault.begin.holds(t, h, instances) {
-                fault.begin(t, links, instances);
+                fault.begin(t, &links.numbers, instances);
                 tell((&fault.label, true));
             }
             if fault.since.is_some_and(|since| fault.ends(since, t, h, instances)) {
@@ -156,8 +173,10 @@ impl Faults {
         for fault in &self.all {
             out.push(u64::from(fault.over) | u64::from(fault.since.is_some()) << 1);
             out.put(fault.since.unwrap_or(0.0));
-            fault.entries.iter().for_each(|e| e.modifier.remember(&mut out));
-            fault.own.iter().for_each(|own| {
+            let Places { entries, messages, own } = &fault.places;
+            entries.iter().for_each(|e| e.modifier.remember(&mut out));
+            messages.iter().for_each(|m| m.modifier.remember(&mut out));
+            own.iter().for_each(|own| {
                 own.modifier.remember(&mut out);
                 out.put(own.sound);
                 out.put(own.told);
@@ -167,15 +186,16 @@ impl Faults {
     }
 
     /// Back to a snapshot.
-    pub fn recall(&mut self, kept: &[u64]) {
-        let mut kept = Recall(kept);
+    pub fn recall(&mut self, kept: &mut Recall) {
         for fault in &mut self.all {
             let flags = kept.word();
             let since = kept.number();
             (fault.over, fault.since) = (flags & 1 != 0, (flags & 2 != 0).then_some(since));
-            fault.entries.iter_mut().for_each(|e| e.modifier.recall(&mut kept));
-            fault.own.iter_mut().for_each(|own| {
-                own.modifier.recall(&mut kept);
+            let Places { entries, messages, own } = &mut fault.places;
+            entries.iter_mut().for_each(|e| e.modifier.recall(kept));
+            messages.iter_mut().for_each(|m| m.modifier.recall(kept));
+            own.iter_mut().for_each(|own| {
+                own.modifier.recall(kept);
                 (own.sound, own.told) = (kept.number(), kept.number());
             });
         }
@@ -185,21 +205,24 @@ impl Faults {
 /// Where a fault of a variable acts, or why it can act nowhere.
 fn place(
     variable: VariableRef,
-    links: &[Link],
+    links: &Links,
     instances: &[Instance],
     modifier: &Modifier,
-) -> std::result::Result<(Vec<Entry>, Option<Own>), String> {
+) -> std::result::Result<Places, String> {
+    if links.streams.iter().any(|l| l.to() == variable) {
+        return of_stream(|l| l.to() == variable, links, modifier);
+    }
     let v = variable.describe(instances);
     let is_input = matches!(v.causality, Causality::Input | Causality::Parameter);
     let mut entries = Vec::new();
-    for (link, on) in links.iter().enumerate() {
+    for (link, on) in links.numbers.iter().enumerate() {
         for number in on.numbers_of(variable.slot, v.id, is_input) {
             let conversion = if is_input { (1.0, 0.0) } else { on.conversion(number) };
             entries.push(Entry { link, number, conversion, modifier: modifier.clone() });
         }
     }
     if !entries.is_empty() {
-        return Ok((entries, None));
+        return Ok(Places { entries, ..Places::default() });
     }
     match (is_input, v.value_type, v.effect) {
         (false, ..) => {
@@ -207,19 +230,40 @@ fn place(
         }
         (_, ValueType::String | ValueType::Binary | ValueType::Clock, _) => Err("is no number".into()),
         (_, _, Effect::Live) => {
-            Ok((entries, Some(Own { variable, modifier: modifier.clone(), sound: 0.0, told: f64::NAN })))
+            let own = Own { variable, modifier: modifier.clone(), sound: 0.0, told: f64::NAN };
+            Ok(Places { own: Some(own), ..Places::default() })
         }
         _ => Err("cannot be set between steps".into()),
     }
 }
 
+/// Where a fault of a stream acts: on those of its connections that are meant; or why it can act nowhere.
+fn of_stream(
+    meant: impl Fn(&StreamLink) -> bool,
+    links: &Links,
+    modifier: &Modifier,
+) -> std::result::Result<Places, String> {
+    if !modifier.takes_messages() {
+        return Err("carries messages, no numbers: of the faults it can have `freeze` and `drop-out`".into());
+    }
+    let meant = links.streams.iter().enumerate().filter(|(_, l)| meant(l));
+    let messages: Vec<Messages> =
+        meant.map(|(link, _)| Messages { link, modifier: modifier.clone() }).collect();
+    if messages.is_empty() {
+        return Err(
+            "is a stream that feeds no other subsystem: a fault of a stream acts on its connections".into()
+        );
+    }
+    Ok(Places { messages, ..Places::default() })
+}
+
 impl Fault {
     fn see(&mut self, t: f64, links: &[Link], instances: &[Instance]) {
-        for e in &mut self.entries {
+        for e in &mut self.places.entries {
             let x = e.sound(links[e.link].value(e.number));
             e.modifier.see(t, x);
         }
-        if let Some(own) = &mut self.own {
+        if let Some(own) = &mut self.places.own {
             let now = own.variable.number(instances).unwrap_or(f64::NAN);
             // what the fault itself has set is not what anybody wanted
             if self.since.is_none() || now != own.told {
@@ -231,11 +275,12 @@ impl Fault {
 
     fn begin(&mut self, t: f64, links: &[Link], instances: &[Instance]) {
         self.since = Some(t);
-        for e in &mut self.entries {
+        for e in &mut self.places.entries {
             let x = e.sound(links[e.link].value(e.number));
             e.modifier.begin(t, x);
         }
-        if let Some(own) = &mut self.own {
+        self.places.messages.iter_mut().for_each(|m| m.modifier.begin(t, 0.0));
+        if let Some(own) = &mut self.places.own {
             own.sound = own.variable.number(instances).unwrap_or(f64::NAN);
             own.told = own.sound;
             own.modifier.begin(t, own.sound);
@@ -252,7 +297,7 @@ impl Fault {
 
     fn finish(&mut self, t: f64, instances: &mut [Instance]) -> Result {
         (self.since, self.over) = (None, true);
-        match &mut self.own {
+        match &mut self.places.own {
             Some(own) => {
                 let sound = own.sound;
                 own.set(t, sound, instances)
@@ -261,14 +306,18 @@ impl Fault {
         }
     }
 
-    fn change(&mut self, t: f64, links: &mut [Link], instances: &mut [Instance]) -> Result {
-        for e in &mut self.entries {
+    fn change(&mut self, t: f64, links: &mut Links, instances: &mut [Instance]) -> Result {
+        for m in &self.places.messages {
+            links.streams[m.link].change(m.modifier.fate(t));
+        }
+        let links = &mut links.numbers;
+        for e in &mut self.places.entries {
             let value = links[e.link].value_mut(e.number);
             let (a, b) = e.conversion;
             let changed = e.modifier.changed(t, e.sound(*value));
             *value = if (a, b) == (1.0, 0.0) { changed } else { a * changed + b };
         }
-        match &mut self.own {
+        match &mut self.places.own {
             Some(own) => {
                 let changed = own.modifier.changed(t, own.sound);
                 own.set(t, changed, instances)

@@ -10,13 +10,15 @@ mod fault;
 mod initial;
 mod modifier;
 pub mod pattern;
+mod stream_link;
 mod table;
 mod traffic;
 
-pub use access::{Directory, VariableRef};
+pub use access::{Directory, VariableRef, streams};
 pub use connection::{Link, Links, connect};
 pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
 pub use fault::Faults;
 pub use initial::initialize;
+pub use stream_link::StreamLink;
 pub use traffic::Signals;

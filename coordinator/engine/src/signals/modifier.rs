@@ -18,6 +18,17 @@ pub struct Modifier {
     past: VecDeque<(f64, f64)>,
 }
 
+/// What becomes of a message of a stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It arrives.
+    Passes,
+    /// It does not.
+    Lost,
+    /// The message that came last arrives once more in its place.
+    Again,
+}
+
 impl Modifier {
     /// Makes one; `h` is the step of the run, s.
     pub fn new(kind: FaultKind, seed: u64, h: f64) -> Self {
@@ -61,6 +72,21 @@ impl Modifier {
                 self.held
             }
             FaultKind::Noise(deviation) => x + deviation * gauss(&mut self.random(t)),
+        }
+    }
+
+    /// Whether it is a fault that messages can have.
+    pub fn takes_messages(&self) -> bool {
+        matches!(self.kind, FaultKind::Freeze | FaultKind::DropOut(_))
+    }
+
+    /// What becomes of a message that is on its way at time t under the fault. One that is on its way when a freeze begins
+    /// still arrives, as the number of that time does.
+    pub fn fate(&self, t: f64) -> Fate {
+        match self.kind {
+            FaultKind::Freeze if t > self.since => Fate::Again,
+            FaultKind::DropOut(probability) if self.random(t).unit() < probability => Fate::Lost,
+            _ => Fate::Passes,
         }
     }
 

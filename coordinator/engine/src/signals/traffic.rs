@@ -4,6 +4,7 @@
 use super::fault::Change;
 use super::{Directory, Faults, Link, Links, TimeLine, initialize};
 use terraglue_diagnostics::Result;
+use terraglue_gluing::memory::Recall;
 use terraglue_host::Instance;
 use terraglue_subsystem::Capabilities;
 
@@ -23,13 +24,16 @@ pub struct Signals {
 impl Signals {
     /// Number of variables that are fed by another one.
     pub fn connections(&self) -> usize {
-        self.links.numbers.iter().map(Link::count).sum::<usize>() + self.links.discrete.len()
+        self.links.numbers.iter().map(Link::count).sum::<usize>()
+            + self.links.discrete.len()
+            + self.links.streams.len()
     }
 
     /// Whether a connection feeds a variable.
     pub fn is_fed(&self, instances: &[Instance], slot: usize, id: u32) -> bool {
         self.links.numbers.iter().any(|l| l.feeds(slot, id))
             || self.links.discrete.iter().any(|l| l.feeds(instances, slot, id))
+            || self.links.streams.iter().any(|l| l.to().slot == slot && l.to().describe(instances).id == id)
     }
 
     /// The time of the next event or fault after t, s.
@@ -62,7 +66,7 @@ impl Signals {
     ) -> Result {
         self.read(instances)?;
         if !self.faults.is_empty() {
-            self.faults.apply((t, h), &mut self.links.numbers, instances, tell)?;
+            self.faults.apply((t, h), &mut self.links, instances, tell)?;
         }
         self.write(instances)
     }
@@ -82,10 +86,24 @@ impl Signals {
     ///
     /// # Errors
     /// A value that a module refuses.
-    pub fn write(&self, instances: &mut [Instance]) -> Result {
+    pub fn write(&mut self, instances: &mut [Instance]) -> Result {
         for link in &self.links.numbers {
             link.pass_on(instances)?;
         }
-        self.links.discrete.iter().try_for_each(|l| l.pass_on(instances))
+        self.links.discrete.iter().try_for_each(|l| l.pass_on(instances))?;
+        self.links.streams.iter_mut().try_for_each(|l| l.pass_on(instances))
+    }
+
+    /// For a snapshot.
+    pub fn remember(&self) -> Vec<u64> {
+        let mut out = self.faults.remember();
+        self.links.streams.iter().for_each(|link| link.remember(&mut out));
+        out
+    }
+
+    /// Back to a snapshot.
+    pub fn recall(&mut self, kept: &mut Recall) {
+        self.faults.recall(kept);
+        self.links.streams.iter_mut().for_each(|link| link.recall(kept));
     }
 }

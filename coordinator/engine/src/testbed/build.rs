@@ -129,7 +129,7 @@ fn signals(scenario: &Scenario, instances: &[Instance]) -> Result<Signals> {
     let links = signals::connect(&scenario.connections, &directory, instances, source)?;
     let time_line = TimeLine::new(&scenario.events, &directory, instances, source)?;
     let random = (scenario.world.seed, scenario.time.step_s);
-    let faults = Faults::new(&scenario.faults, &links.numbers, &directory, instances, source, random)?;
+    let faults = Faults::new(&scenario.faults, &links, &directory, instances, source, random)?;
     Ok(Signals { links, directory, time_line, faults })
 }
 

@@ -3,7 +3,7 @@
 use super::Testbed;
 use super::group::Group;
 use super::schedule::StepSchedule;
-use crate::signals::Links;
+use crate::signals::{Links, VariableRef, streams};
 use serde::{Deserialize, Serialize};
 use terraglue_host::Instance;
 use terraglue_scenario::Scenario;
@@ -69,14 +69,26 @@ impl Sight<'_> {
                 to,
                 conversion: Some(conversion),
                 by_table: false,
+                stream: false,
             })
         });
-        let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(self.instances).id);
+        let variable = |at: VariableRef| (at.slot, at.describe(self.instances).id);
         let discrete = self.links.discrete.iter().map(|d| {
             let [from, to] = d.ends().map(variable);
-            ConnectionEnds { from, to, conversion: d.conversion(), by_table: d.has_table() }
+            ConnectionEnds { from, to, conversion: d.conversion(), by_table: d.has_table(), stream: false }
         });
-        numbers.chain(discrete).collect()
+        let places: Vec<_> = streams(self.instances).map(|(_, place)| place).collect();
+        let messages = self.links.streams.iter().map(|l| {
+            let (slot, k) = places[l.stream()];
+            ConnectionEnds {
+                from: (slot, k as u32),
+                to: variable(l.to()),
+                conversion: None,
+                by_table: false,
+                stream: true,
+            }
+        });
+        numbers.chain(discrete).chain(messages).collect()
     }
 
     fn order(&self, ends: &[ConnectionEnds]) -> Vec<String> {
@@ -127,6 +139,9 @@ impl Sight<'_> {
     }
 
     fn connection_note(&self, end: &ConnectionEnds) -> ConnectionNote {
+        if end.stream {
+            return self.stream_note(end);
+        }
         let full = |(slot, id): (usize, u32)| {
             let variable = self.instances[slot].variables().iter().find(|v| v.id == id);
             let name = format!("{}.{}", self.instances[slot].name(), variable.map_or("?", |v| &v.name));
@@ -152,6 +167,20 @@ impl Sight<'_> {
             ),
         };
         ConnectionNote { from, to, value: value + &units, delay, why }
+    }
+
+    fn stream_note(&self, end: &ConnectionEnds) -> ConnectionNote {
+        let (from, to) = (&self.instances[end.from.0], &self.instances[end.to.0]);
+        let stream = from.subsystem().streams().get(end.from.1 as usize).map_or("?", |s| &s.name);
+        let input = to.variables().iter().find(|v| v.id == end.to.1).map_or("?", |v| &v.name);
+        ConnectionNote {
+            from: format!("{}.{stream}", from.name()),
+            to: format!("{}.{input}", to.name()),
+            value: "each message".into(),
+            delay: "1".into(),
+            why: "set at the start of the step after the one that made it, and held until the next message"
+                .into(),
+        }
     }
 
     /// Each set of subsystems that reach each other over connections.
@@ -187,6 +216,8 @@ struct ConnectionEnds {
     to: (usize, u32),
     conversion: Option<(f64, f64)>,
     by_table: bool,
+    /// Whether `from` is the number of a stream.
+    stream: bool,
 }
 
 impl Explanation {

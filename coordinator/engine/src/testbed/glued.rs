@@ -185,28 +185,30 @@ impl GluedGroups {
         Ok(())
     }
 
-    /// What each group, faults (given), contact detection and the control of the steps keep from step to step.
-    pub fn memory(&self, faults: Vec<u64>) -> Vec<Vec<u64>> {
+    /// What each group, signals and streams (given), contact detection and the control of the steps keep from step to step.
+    pub fn memory(&self, signals: Vec<u64>, streams: Vec<u64>) -> Vec<Vec<u64>> {
         let mut all: Vec<Vec<u64>> = self.groups.iter().map(Group::memory).collect();
-        all.push(faults);
+        all.push(signals);
         all.push(self.detector.remember());
         let mut last = Vec::new();
         self.control.iter().for_each(|c| c.remember(&mut last));
         all.push(last);
+        all.push(streams);
         all
     }
 
-    /// Back to what [`GluedGroups::memory`] gave; what the faults kept.
-    pub fn recall<'a>(&mut self, memory: &'a [Vec<u64>]) -> Option<&'a [u64]> {
+    /// Back to what [`GluedGroups::memory`] gave; what signals and streams kept.
+    pub fn recall<'a>(&mut self, memory: &'a [Vec<u64>]) -> [Recall<'a>; 2] {
         for (group, kept) in self.groups.iter_mut().zip(memory) {
             group.recall(kept);
         }
         let mut others = memory.iter().skip(self.groups.len());
-        let faults = others.next();
+        let signals = others.next();
         others.next().into_iter().for_each(|kept| self.detector.recall(kept));
-        if let (Some(control), Some(kept)) = (&mut self.control, others.next()) {
-            control.recall(&mut Recall(kept));
+        let control = others.next();
+        if let (Some(own), Some(kept)) = (&mut self.control, control) {
+            own.recall(&mut Recall(kept));
         }
-        faults.map(Vec::as_slice)
+        [signals, others.next()].map(|kept| Recall(kept.map_or(&[], Vec::as_slice)))
     }
 }

@@ -51,7 +51,7 @@ impl Testbed {
             "started": kept.started,
             "before": before_bits(&kept.before),
             "fired": self.signals.time_line.fired(),
-            "memory": self.glued.memory(self.signals.faults.remember()),
+            "memory": self.glued.memory(self.signals.remember(), self.streams.remember()),
             "lengths": parts.iter().map(Vec::len).collect::<Vec<_>>(),
         });
         let mut out = head.to_string().into_bytes();

@@ -4,6 +4,7 @@
 
 use super::run_clock::RunClock;
 use super::schedule::Span;
+use super::shown::Shown;
 use super::subsystems::Subsystems;
 use super::uncoupled::span;
 use std::sync::Arc;
@@ -26,7 +27,7 @@ struct Open {
     seers: Vec<usize>,
     /// Fields `height`: slots and numbers of fields.
     grounds: Vec<(usize, usize)>,
-    /// Slots of those that have shapes, with room for what is shown.
+    /// Slots of those that can hide shapes, with room for what is shown.
     shown: Vec<(usize, Vec<bool>)>,
     /// Slots of those that have bodies that move, with their states at the start of the step.
     before: Vec<(usize, Vec<BodyState>)>,
@@ -59,7 +60,7 @@ impl Sight {
                 builder.ground(number, &instance.fields()[field]).map_err(|e| odd(&e))?;
                 grounds.push((slot, field));
             }
-            if !scene.shapes.is_empty() {
+            if instance.capabilities().has(Capabilities::HIDES) {
                 shown.push((slot, vec![true; scene.shapes.len()]));
             }
         }
@@ -102,8 +103,8 @@ impl Sight {
         let Some(open) = &mut self.open else { return Ok(()) };
         let step = Step::free(clock.t, 0.0, clock.index);
         open.update([clock.t; 2], subsystems)?;
-        let Open { world, seers, .. } = open.as_mut();
-        seers.iter().try_for_each(|slot| observe(&mut subsystems.instances[*slot], &step, &*world))
+        let Open { world, seers, .. } = open.as_ref();
+        seers.iter().try_for_each(|slot| look(world, &mut subsystems.instances, *slot, &step))
     }
 }
 
@@ -117,7 +118,7 @@ impl Open {
         let Subsystems { instances, schedules, .. } = subsystems;
         for slot in &self.seers {
             if let Some(step) = schedules[*slot].step_of(span) {
-                observe(&mut instances[*slot], &step, &self.world)?;
+                look(&self.world, instances, *slot, &step)?;
             }
         }
         Ok(())
@@ -140,6 +141,13 @@ impl Open {
             update.ground(*slot as u32, tile).map_err(|e| odd(&e))?;
         }
         Ok(())
+    }
+}
+
+fn look(world: &WorldModel, instances: &mut [Instance], slot: usize, step: &Step) -> Result {
+    match Shown::to(world, instances, slot) {
+        Some((instance, shown)) => observe(instance, step, &shown),
+        None => Ok(()),
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::Testbed;
 use super::subsystems::Subsystems;
+use crate::signals::StreamLink;
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::timing::Timings;
@@ -36,8 +37,9 @@ impl Testbed {
             self.stand(count as u64)?;
         }
         self.streams.forget();
+        self.signals.links.streams.iter_mut().for_each(StreamLink::forget);
         self.sight.begin(&self.clock, &mut self.subsystems)?;
-        self.streams.collect(&self.subsystems.instances)
+        self.collect_messages()
     }
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.

@@ -2,7 +2,9 @@
 //! has told. What is beyond them is left out with a warning that names the stream; nothing waits.
 
 use crate::observer::StreamView;
+use crate::signals;
 use terraglue_diagnostics::Result;
+use terraglue_gluing::memory::{Recall, Remember};
 use terraglue_host::Instance;
 use terraglue_subsystem::StreamInfo;
 
@@ -31,12 +33,10 @@ struct State {
 impl Streams {
     pub fn new(instances: &[Instance]) -> Self {
         let mut all = Self::default();
-        for (slot, instance) in instances.iter().enumerate() {
-            for (k, info) in instance.subsystem().streams().iter().enumerate() {
-                let name = format!("{}.{}", instance.name(), info.name);
-                all.views.push(StreamView { name, info: info.clone(), messages: Vec::new() });
-                all.places.push((slot, k));
-            }
+        for (name, (slot, k)) in signals::streams(instances) {
+            let info = instances[slot].subsystem().streams()[k].clone();
+            all.views.push(StreamView { name, info, messages: Vec::new() });
+            all.places.push((slot, k));
         }
         all.state = vec![State::default(); all.views.len()];
         all
@@ -53,16 +53,35 @@ impl Streams {
         &self.views
     }
 
-    /// A run goes on from another time.
+    /// The run begins.
     pub fn forget(&mut self) {
         self.clear();
         self.state.iter_mut().for_each(|state| state.last = None);
     }
 
-    /// Takes what the last communication step made.
-    pub fn collect(&mut self, instances: &[Instance]) -> Result {
-        let all = self.views.iter_mut().zip(&self.places).zip(&mut self.state);
-        for ((view, (slot, k)), state) in all {
+    /// For a snapshot: the times of the last messages, so that none is taken twice.
+    pub fn remember(&self) -> Vec<u64> {
+        let mut out = Vec::new();
+        for State { last, .. } in &self.state {
+            out.push(u64::from(last.is_some()));
+            out.put(last.unwrap_or(0.0));
+        }
+        out
+    }
+
+    /// Back to a snapshot.
+    pub fn recall(&mut self, kept: &mut Recall) {
+        self.clear();
+        for state in &mut self.state {
+            let (there, time) = (kept.word() != 0, kept.number());
+            state.last = there.then_some(time);
+        }
+    }
+
+    /// Takes what the last communication step made; `tell` hears the number of the stream and the bytes of each message.
+    pub fn collect(&mut self, instances: &[Instance], mut tell: impl FnMut(usize, &[u8])) -> Result {
+        let all = self.views.iter_mut().zip(&self.places).zip(&mut self.state).enumerate();
+        for (number, ((view, (slot, k)), state)) in all {
             let Some(message) = terraglue_host::message(&instances[*slot], *k)? else { continue };
             // told again: the instance has made no step since
             if state.last == Some(message.time) {
@@ -77,6 +96,7 @@ impl Streams {
             }
             self.bytes = total;
             state.last = Some(message.time);
+            tell(number, message.bytes);
             view.messages.push((message.time, message.bytes.to_vec()));
         }
         Ok(())

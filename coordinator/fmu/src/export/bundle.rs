@@ -332,7 +332,7 @@ fn entries(
     ];
     let icon = page::icon().map_err(|e| plain(format!("the icon: {e}")))?;
     all.push((if two { "model.png" } else { "terminalsAndIcons/icon.png" }.into(), Content::Bytes(icon)));
-    if let Some(terminals) = terraglue_fmi::export::terminals(&opened.layout) {
+    if let Some(terminals) = terraglue_fmi::export::terminals(&opened.layout, &opened.joints) {
         all.push(("terminalsAndIcons/terminalsAndIcons.xml".into(), Content::Text(terminals)));
     }
     let mut files = Vec::new();

@@ -77,7 +77,8 @@ pub fn open(opening: &Opening) -> Result<Opened, String> {
     let subsystem = whole.map_err(|e| e.to_string())?;
     let layout =
         Layout::new(settings.fmi(), settings.scalars, terraglue_subsystem::Subsystem::variables(&subsystem));
-    Ok(Opened { layout, token: settings.token, slots: SLOTS, settles: true, subsystem: Box::new(subsystem) })
+    let (joints, token) = (subsystem.joints(), settings.token);
+    Ok(Opened { layout, token, slots: SLOTS, settles: true, joints, subsystem: Box::new(subsystem) })
 }
 
 fn instance(

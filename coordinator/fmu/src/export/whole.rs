@@ -3,6 +3,7 @@
 use super::super::driven_bodies;
 use terraglue_engine::Testbed;
 use terraglue_engine::testbed::Snapshot;
+use terraglue_fmi::export::JointTerminal;
 use terraglue_host::Reply;
 use terraglue_subsystem::{
     Capabilities, Causality, Effect, Energy, Error, Input, Motion, Response, Result, Step, Subsystem, Values,
@@ -27,6 +28,8 @@ pub(super) struct Whole {
     snapshots: Vec<Option<Snapshot>>,
     /// Length of the scenario's own steps, s.
     step_s: f64,
+    /// The subsystem whose variables are shown without its name in front.
+    bare: Option<String>,
 }
 
 impl Whole {
@@ -42,7 +45,33 @@ impl Whole {
         let capabilities = capabilities(&testbed);
         let step_s = testbed.step_s();
         let snapshots = (0..slots).map(|_| None).collect();
-        Ok(Self { testbed, variables, places, feet, capabilities, snapshots, step_s })
+        let bare = bare.map(str::to_owned);
+        Ok(Self { testbed, variables, places, feet, capabilities, snapshots, step_s, bare })
+    }
+
+    /// The joints of all subsystems with the shown names of their variables.
+    pub fn joints(&self) -> Vec<JointTerminal> {
+        let shown = |slot: usize, id: u32| {
+            let place = self.places.iter().position(|p| (p.slot, p.id) == (slot, id))?;
+            Some(self.variables[place].name.clone())
+        };
+        let instances = self.testbed.instances().iter().enumerate();
+        let all = instances.flat_map(|(slot, i)| i.scene().joints.iter().map(move |j| (slot, i.name(), j)));
+        all.map(|(slot, owner, joint)| {
+            let v = &joint.variables;
+            let members = [
+                ("position", v.position),
+                ("velocity", v.velocity),
+                ("torque", v.torque),
+                ("torque_limit", v.torque_limit),
+                ("blocked", v.blocked),
+            ];
+            let members = members.into_iter().filter_map(|(m, id)| Some((m, shown(slot, id)?))).collect();
+            let bare = self.bare.as_deref() == Some(owner);
+            let name = if bare { joint.name.clone() } else { format!("{owner}.{}", joint.name) };
+            JointTerminal { name, members }
+        })
+        .collect()
     }
 
     fn place(&self, id: u32) -> Result<VariableSlot> {

@@ -9,7 +9,7 @@ import terraglue as tg
 
 
 class Looker(tg.Subsystem):
-    can = tg.FORCE | tg.SEES
+    can = tg.FORCE | tg.SEES | tg.HIDES
     bodies = [("head", 1.0)]
     shapes = [
         tg.Shape(0, "cone", (0.5, 0.2, 0.1), material=(4, 0.25, 0.0)),
@@ -20,11 +20,13 @@ class Looker(tg.Subsystem):
     streams = [tg.Stream("seen", "test.Text", "text", 100.0, 4096)]
     neck = 0.5
     text = None
+    broken = False
 
     def advance(self, step, given, out):
         pass
 
     def observe(self, step, world):
+        self.broken = world.subsystems[0] == "broken"
         if world.subsystems[0] == "endless":
             while True:
                 world.pose((1, 0), step.t)
@@ -39,6 +41,8 @@ class Looker(tg.Subsystem):
         ])
 
     def stream(self, k):
+        if self.broken:
+            raise ValueError("the lens is dirty")
         return None if self.text is None else (self.neck, self.text.encode())
 
     def shape_visibility(self):
@@ -163,6 +167,20 @@ fn a_module_that_never_stops_asking_is_ended() {
     assert!(matches!(&error, Error::Fatal(text) if text.contains("went on asking")), "{error}");
 }
 
+#[test]
+fn a_stream_that_fails_in_a_process_of_its_own_is_an_error_and_no_silence() {
+    let mut looker = looker(30.0);
+    let step = Step::free(1.0, 0.25, 0);
+    looker.observe(&step, &world("broken")).expect("it sees");
+    assert_eq!(looker.stream(0), Err(Error::Failed("the lens is dirty".into())));
+    let instance = crate::Instance::new("eye", "looker", Kind::Sensor, looker);
+    let told = crate::message(&instance, 0).expect_err("told with name and function").to_string();
+    assert!(
+        ["eye (looker)", "stream failed at t = ", "the lens is dirty"].iter().all(|word| told.contains(word)),
+        "{told}"
+    );
+}
+
 /// The range finders of the page on sensors, in C and in Python.
 const EXAMPLES: [&str; 2] = [
     include_str!("../../../../tests/modules/range-finder/range_finder.c"),
@@ -198,4 +216,70 @@ fn the_range_finders_of_the_page_measure_the_same() {
     let empty = TestWorld { names: vec!["ground".into()], scene: Scene::default() };
     let error = crate::observe(&mut c, &step, &empty);
     assert!(error.expect_err("no body").to_string().contains("the body of `mount` is not there"));
+}
+
+/// An open mesh that says it can be hit.
+struct Sheet;
+
+impl Module for Sheet {
+    fn schema() -> Schema {
+        Schema { name: "sheet".into(), kind: Kind::Robot, help: "A sheet".into(), parameters: Vec::new() }
+    }
+    fn instantiate(_: &Config, _: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        Ok(Box::new(Self))
+    }
+}
+
+impl Subsystem for Sheet {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::FORCE
+    }
+    fn advance(&mut self, _: &Step, _: &Input, _: &mut Response) -> Result {
+        Ok(())
+    }
+    fn scene(&self) -> Scene {
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let shape = SceneShape {
+            id: 0,
+            body: 0,
+            name: "leaf".into(),
+            geometry: Geometry::Mesh { points, triangles: vec![[0, 1, 2]] },
+            body_from_shape: Pose::IDENTITY,
+            collides: true,
+            material: Material::UNKNOWN,
+        };
+        let bodies = vec![SceneBody { name: "leaf".into(), mass: 1.0 }];
+        Scene { bodies, shapes: vec![shape], joints: Vec::new() }
+    }
+}
+
+const PYTHON_SHEET: &str = r#""""A sheet.
+
+[module]
+name = "sheet"
+kind = "robot"
+"""
+import terraglue as tg
+
+
+class Sheet(tg.Subsystem):
+    bodies = [("leaf", 1.0)]
+    shapes = [tg.Shape(0, "sheet", ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]), "leaf")]
+    shapes[0].collides = True
+
+    def advance(self, step, input, out):
+        pass
+"#;
+
+#[test]
+fn an_open_mesh_that_collides_is_refused_from_rust_and_python() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("sheet.py");
+    std::fs::write(&path, PYTHON_SHEET).expect("written");
+    let python = crate::LoadedModule::load(&path).expect("loads");
+    for module in [crate::LoadedModule::builtin::<Sheet>(), python] {
+        let refused = module.instantiate("sheet", Config::default(), &super::services());
+        let told = refused.err().expect("refused").to_string();
+        assert!(told.contains("the shape `leaf`") && told.contains("is seen only"), "{told}");
+    }
 }

@@ -9,6 +9,7 @@ use crate::keep::Keep;
 use crate::kept_file::{KeptFile, shorter};
 use crate::layout::{RECORDING, at, other_at};
 use crate::messages::WindowRecord;
+use crate::overlays::Overlays;
 use crate::records::{HEAD, chunk};
 use crate::snapshot::Snapshot;
 use mcap::records::{MessageHeader, Record, op};
@@ -56,8 +57,24 @@ pub(crate) struct McapState {
     drawn: Vec<u64>,
     forces_next_s: f64,
     window: WindowRecord,
+    /// Topics of the layers of overlays.
+    layers: Vec<String>,
+    /// Which shapes were shown.
+    shown: Vec<Vec<bool>>,
 }
-persist!(McapState { kept, sequence, pending, written, ground, unseen, drawn, forces_next_s, window });
+persist!(McapState {
+    kept,
+    sequence,
+    pending,
+    written,
+    ground,
+    unseen,
+    drawn,
+    forces_next_s,
+    window,
+    layers,
+    shown
+});
 
 impl McapWriter {
     /// From now on [`McapWriter::state`] can be asked for.
@@ -86,6 +103,8 @@ impl McapWriter {
             drawn: self.drawn.clone(),
             forces_next_s: self.forces_next_s,
             window: self.window,
+            layers: self.overlays.iter().flat_map(Overlays::layers).cloned().collect(),
+            shown: self.visibility.flags(),
         })
     }
 
@@ -108,6 +127,10 @@ impl McapWriter {
         }
         writer.find(view)?;
         writer.announce(view, snapshot)?;
+        if let Some(mut overlays) = writer.overlays.take() {
+            state.layers.iter().try_for_each(|topic| writer.layer(&mut overlays, topic.clone()).map(drop))?;
+            writer.overlays = Some(overlays);
+        }
         writer.take(state).map_err(other_at(&path))?;
         let Some(encoder) = writer.sink.encoder() else { return Ok(writer) };
         let mut again = writer.pending.iter().flatten();
@@ -132,6 +155,7 @@ impl McapWriter {
         }
         self.forces_next_s = state.forces_next_s;
         self.window = state.window;
+        self.visibility.recall(state.shown);
         Ok(())
     }
 }

@@ -24,6 +24,10 @@ pub struct Synthetic {
     pub silent: bool,
     /// Commanded speed, m/s.
     pub speed: f64,
+    /// Whether its second shape is hidden from 0.3 s to 0.6 s.
+    pub hides: bool,
+    /// How often it was asked for overlays.
+    pub asked: std::cell::Cell<u32>,
     variables: Vec<Variable>,
     fields: Vec<FieldInfo>,
     tiles: Vec<(u64, Vec<f64>, Vec<f64>)>,
@@ -105,6 +109,8 @@ impl Synthetic {
             nan: false,
             silent: false,
             speed: SPEED,
+            hides: false,
+            asked: std::cell::Cell::new(0),
             variables,
             fields: Vec::new(),
             tiles: Vec::new(),
@@ -156,7 +162,40 @@ impl Synthetic {
 
 impl Subsystem for Synthetic {
     fn capabilities(&self) -> Capabilities {
-        Capabilities::default()
+        if self.hides { Capabilities::HIDES } else { Capabilities::default() }
+    }
+    fn shape_visibility(&self, out: &mut [bool]) -> terraglue_subsystem::Result {
+        out.fill(true);
+        out[1] = !(0.3..0.6).contains(&self.t);
+        Ok(())
+    }
+    /// The robot has a way and, from 0.25 s on, a name; the gait a line in the frame of the body that it walks.
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        self.asked.set(self.asked.get() + 1);
+        let mut show = |layer: &str, frame: u32, figure: Figure| {
+            out.push(Overlay { layer: layer.into(), frame, colour: [1.0, 0.5, 0.0, 1.0], figure });
+        };
+        let points = vec![[0.0; 3], [0.0, self.t, 1.0]];
+        match self.kind {
+            Kind::Robot => {
+                show("the way", 0, Figure::Arrows { points, width: 0.01 });
+                if self.t >= 0.25 {
+                    show("name", 0, Figure::Text { at: [0.0, 0.0, 0.2], height: 0.1, text: "walker".into() });
+                    show(
+                        "name",
+                        Overlay::WORLD,
+                        Figure::Points { points: vec![[1.0, 2.0, 3.0]], size: 0.02 },
+                    );
+                    show("name", 99, Figure::Points { points: vec![[0.0; 3]], size: 0.02 });
+                }
+            }
+            Kind::Controller => {
+                show("polygon", Overlay::MOUNT, Figure::Lines { points, width: 0.01 });
+                let pose = Pose { position: [0.0, 0.0, 0.5], ..Pose::IDENTITY };
+                show("polygon", Overlay::MOUNT, Figure::Ellipse { pose, semi_axes: [0.2, 0.1] });
+            }
+            _ => {}
+        }
     }
     fn advance(&mut self, _: &Step, _: &Input, _: &mut Response) -> terraglue_subsystem::Result {
         Ok(())
@@ -248,6 +287,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         recording: RecordingSpec {
             ground_every_steps: 100,
             every_steps: 5,
+            overlays: false,
             digits: 17,
             include: Vec::new(),
             exclude: Vec::new(),

@@ -2,6 +2,7 @@
 
 mod figures;
 mod fixture;
+mod overlays;
 
 use super::*;
 use fixture::*;

@@ -34,6 +34,8 @@ pub struct Opened {
     pub slots: u32,
     /// Whether outputs of the start need a step of h = 0.
     pub settles: bool,
+    /// Joints, for their terminals.
+    pub joints: Vec<super::JointTerminal>,
 }
 
 /// Makes the subsystem of an FMU from its resources; on failure says why.

@@ -19,7 +19,7 @@ pub use exported_instance::{ExportedInstance, Mailbox, Open, Opened, Opening, Ph
 pub use layout::{Entry, Layout};
 pub use pack::{Content, pack};
 pub use states::Handle;
-pub use terminals::terminals;
+pub use terminals::{JointTerminal, terminals};
 pub use values::FmiType;
 
 /// What a call of an FMU did not do, with the status that the standards give it.

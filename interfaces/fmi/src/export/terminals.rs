@@ -1,6 +1,6 @@
-//! Terminals of FMI 3.0: the variables of a body, and those of driven feet, named as what plugs into another FMU.
+//! Terminals of FMI 3.0: the variables of a body, of a joint, and those of driven feet, named as what plugs into another FMU.
 //!
-//! A group `NAME.x`, `NAME.y`, `NAME.z` is a body (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet
+//! Joints (`org.terraglue.joint`) are told by the subsystem itself, their members with the names of their variables. A group `NAME.x`, `NAME.y`, `NAME.z` is a body (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet
 //! (`org.terraglue.feet`, a row per foot). Members are matched by their names.
 
 use super::Layout;
@@ -39,21 +39,53 @@ const BODY: [&str; 25] = [
 /// Members of feet.
 const FEET: [&str; 4] = ["position", "orientation", "force", "moment"];
 
+/// A joint with the names of the variables behind its members (`position`, `velocity`, `torque`, `torque_limit`, `blocked`).
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointTerminal {
+    /// Its full name.
+    pub name: String,
+    /// Members and variables.
+    pub members: Vec<(&'static str, String)>,
+}
+
+/// A terminal: name, kind, members with their variables.
+type Terminal = (String, &'static str, Vec<(&'static str, String)>);
+
+/// All terminals; their names differ. The name of one has no dots: those would be terminals inside it.
+fn all(layout: &Layout, joints: &[JointTerminal]) -> Vec<Terminal> {
+    let mut all: Vec<Terminal> = Vec::new();
+    for (prefix, kind, members) in groups(layout) {
+        let members = members.into_iter().map(|m| (m, format!("{prefix}.{m}"))).collect();
+        all.push((prefix.replace('.', "_"), kind, members));
+    }
+    for joint in joints {
+        let is_there = |variable: &String| layout.entries.iter().any(|e| e.name == *variable);
+        let members: Vec<_> = joint.members.iter().filter(|(_, v)| is_there(v)).cloned().collect();
+        if members.is_empty() {
+            continue;
+        }
+        let mut name = joint.name.replace('.', "_");
+        // a body may have the name of the joint that carries it
+        while all.iter().any(|(taken, ..)| *taken == name) {
+            name += "_joint";
+        }
+        all.push((name, "org.terraglue.joint", members));
+    }
+    all
+}
+
 /// `terminalsAndIcons.xml`; none where there is no terminal, or before FMI 3.0.
-pub fn terminals(layout: &Layout) -> Option<String> {
-    let all = groups(layout);
+pub fn terminals(layout: &Layout, joints: &[JointTerminal]) -> Option<String> {
+    let all = all(layout, joints);
     if layout.version == Version::V2 || all.is_empty() {
         return None;
     }
     let mut xml = Xml::new();
     xml.open("fmiTerminalsAndIcons", &[("fmiVersion", &"3.0")]);
     xml.open("Terminals", &[]);
-    for (prefix, kind, members) in all {
-        // the name of a terminal has no dots: those would be terminals inside it
-        let name = prefix.replace('.', "_");
+    for (name, kind, members) in all {
         xml.open("Terminal", &[("name", &name), ("matchingRule", &"bus"), ("terminalKind", &kind)]);
-        for member in members {
-            let variable = format!("{prefix}.{member}");
+        for (member, variable) in members {
             xml.leaf(
                 "TerminalMemberVariable",
                 &[("variableName", &variable), ("memberName", &member), ("variableKind", &"signal")],
@@ -99,6 +131,26 @@ mod tests {
     use terraglue_subsystem::{Causality, Variable};
 
     #[test]
+    fn joints_are_terminals_with_the_names_that_their_variables_have() {
+        let real = |(k, name): (usize, &&str)| Variable::real(k as u32, *name, "", Causality::Output, "");
+        let names = ["a.leg.x", "a.leg.y", "a.leg.z", "a.leg.angle", "a.leg.rate"];
+        let variables: Vec<Variable> = names.iter().enumerate().map(real).collect();
+        let layout = Layout::new(Version::V3, false, &variables);
+        let joint = |name: &str, members: &[(&'static str, &str)]| JointTerminal {
+            name: name.into(),
+            members: members.iter().map(|(m, v)| (*m, (*v).to_owned())).collect(),
+        };
+        let moving = [("position", "a.leg.angle"), ("velocity", "a.leg.rate"), ("torque", "a.gone")];
+        let found = all(&layout, &[joint("a.leg", &moving), joint("a.weld", &[])]);
+        // the body has the same name; what the version has no type for is left out, and so is a joint without variables
+        assert_eq!(found.len(), 2);
+        let members = moving[..2].iter().map(|(m, v)| (*m, (*v).to_owned())).collect();
+        assert_eq!(found[1], ("a_leg_joint".to_owned(), "org.terraglue.joint", members));
+        let text = terminals(&layout, &[joint("a.leg", &moving)]).expect("terminals");
+        assert!(text.contains("variableName=\"a.leg.rate\" memberName=\"velocity\""), "{text}");
+    }
+
+    #[test]
     fn bodies_and_feet_are_terminals_and_nothing_else_is() {
         let names = [
             "gait.speed",
@@ -119,11 +171,11 @@ mod tests {
             ("foot", "org.terraglue.feet", vec!["position", "force"]),
         ];
         assert_eq!(found, wanted);
-        let text = terminals(&layout).expect("terminals");
+        let text = terminals(&layout, &[]).expect("terminals");
         assert!(
             text.contains("<Terminal name=\"robot_leg\"")
                 && text.contains("variableName=\"robot.leg.force_x\"")
         );
-        assert_eq!(terminals(&Layout::new(Version::V2, false, &variables)), None);
+        assert_eq!(terminals(&Layout::new(Version::V2, false, &variables), &[]), None);
     }
 }

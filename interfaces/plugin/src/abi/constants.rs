@@ -55,6 +55,8 @@ pub const TG_CAN_FEEDTHROUGH: u32 = 1024;
 pub const TG_CAN_FIXED_STEP: u32 = 4096;
 /// Bit of `capabilities`: `observe`. Since 3.1.
 pub const TG_CAN_SEE: u32 = 8192;
+/// Bit of `capabilities`: `shape_visibility`. Since 3.1.
+pub const TG_CAN_HIDE: u32 = 16384;
 
 /// `tg_port.kind`: one body shape on one ground, unilateral.
 pub const TG_CONTACT: u32 = 0;

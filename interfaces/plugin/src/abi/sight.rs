@@ -209,7 +209,8 @@ pub struct TgOverlay {
     pub layer: *const c_char,
     /// What a text says; else null.
     pub text: *const c_char,
-    /// Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world.
+    /// Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world, UINT32_MAX - 1: the body that
+    /// the parameter `mount` names.
     pub frame: u32,
     /// TG_LINES ... TG_TEXT.
     pub figure: u32,

@@ -229,8 +229,8 @@ pub struct TgSubsystem {
     /// When: at any time after `instantiate`. Thread: that of the instance.
     pub shape_materials:
         Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgMaterial) -> usize>,
-    /// For each of the scene's n shapes 1 where it is shown, 0 where it is hidden; it belongs to the committed state.
-    /// Null: all are shown.
+    /// For each of the scene's n shapes 1 where it is shown, 0 where it is hidden; it belongs to the committed state. Asked with
+    /// the capability TG_CAN_HIDE; without it all are shown.
     /// When: at any time. Thread: that of the instance.
     pub shape_visibility:
         Option<unsafe extern "C" fn(instance: *mut c_void, n: usize, out: *mut u8) -> TgStatus>,

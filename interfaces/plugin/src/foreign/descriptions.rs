@@ -66,6 +66,7 @@ pub(super) fn check_capabilities(capabilities: Capabilities, t: &TgSubsystem) ->
         (Capabilities::SERIALIZE, t.serialize.is_none(), "serialize"),
         (Capabilities::SERIALIZE, t.deserialize.is_none(), "deserialize"),
         (Capabilities::SEES, t.observe.is_none(), "observe"),
+        (Capabilities::HIDES, t.shape_visibility.is_none(), "shape_visibility"),
     ] {
         if missing && capabilities.has(capability) {
             return Err(Error::Fatal(format!(

@@ -169,7 +169,7 @@ fn digest(step: &Step) -> f64 {
 
 impl Subsystem for Everything {
     fn capabilities(&self) -> Capabilities {
-        Capabilities(0x7fb) | Capabilities::SEES
+        Capabilities(0x7fb) | Capabilities::SEES | Capabilities::HIDES
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {

@@ -31,6 +31,7 @@ mod law_memory;
 mod mask;
 mod nodes;
 mod normal;
+mod overlays;
 mod patch;
 mod patch_nodes;
 mod rows;

@@ -7,6 +7,7 @@ use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
 use crate::law_memory::LawMemory;
 use crate::mask::Mask;
+use crate::overlays;
 use crate::patch::{Laws, Patches};
 use crate::state::{Committed, Slot, Slots, Target};
 use crate::trial::Last;
@@ -19,7 +20,7 @@ use terraglue_soil_law::{
 use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{
     Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
-    Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable,
+    Motion, Overlay, Response, Result, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 /// Contact that is this small for so many commits in a row is worth a warning.
@@ -484,6 +485,11 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         self.material.parameters_changed(&self.ground, &self.parameters);
         self.patches.forget();
         Ok(())
+    }
+
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        let friction = |[i, j]: [i32; 2]| self.laws[self.ground.mask.at(i, j)].shear.friction();
+        overlays::of(&self.ground, &self.lists.loaded, friction, out);
     }
 
     fn fields(&self) -> &[FieldInfo] {

@@ -41,7 +41,7 @@ pub(crate) use resume::McapState;
 use resume::Pending;
 use sink::Sink;
 
-/// A chunk ends every so many steps; that many can be lost when the process is killed.
+/// A chunk ends every so many steps. When the process is killed, these can be lost and, where the disk is slow, as many before.
 pub(crate) const FLUSH_STEPS: u64 = 200;
 
 /// How every recording is laid out, also a mended one.
@@ -173,9 +173,7 @@ impl McapWriter {
     }
 
     fn add(&mut self, topic: Topic) -> Result<u16> {
-        let Some(encoder) = self.sink.encoder() else { return Ok(0) };
-        let schema = encoder.add_schema(&topic.schema, "protobuf", &topic.descriptor);
-        let channel = schema.and_then(|s| encoder.add_channel(s, &topic.topic, "protobuf", &topic.metadata));
+        let channel = self.sink.topic(topic);
         self.checked(channel)
     }
 

@@ -2,9 +2,11 @@
 //! encodes chunks, compresses them and writes.
 //!
 //! One thread takes all messages in their order, so the bytes of a recording do not depend on it. What a step pays is a copy of
-//! its messages; a full queue makes it wait. An error of the thread is returned by the call after it.
+//! its messages; a full queue makes it wait, and so does the end of a chunk while the chunk before is not on disk. An error of the
+//! thread is returned by a later call.
 
 use crate::kept_file::KeptFile;
+use crate::topics::Topic;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{McapError, McapResult};
@@ -26,8 +28,10 @@ pub(super) type Kept = (u64, f64);
 /// What the thread is asked to do.
 enum Job {
     Message(MessageHeader, Vec<u8>),
-    /// Ends the chunk and hands everything up to this time to the operating system.
-    Flush(f64),
+    /// Announces a topic and answers the number of its channel.
+    Topic(Topic, SyncSender<u16>),
+    /// Ends the chunk, hands everything up to this time to the operating system, and answers then.
+    Flush(f64, SyncSender<()>),
     /// Answers when all before it is done.
     Answer(SyncSender<()>),
 }
@@ -52,6 +56,8 @@ struct Queue {
     /// Buffers of messages that are written.
     spent: Receiver<Vec<u8>>,
     thread: JoinHandle<Option<Box<Encoder>>>,
+    /// Answers when the last flush is done.
+    flushed: Option<Receiver<()>>,
 }
 
 /// What the thread has come to.
@@ -89,7 +95,7 @@ impl Sink {
             write_all(encoder, &path, &progress, &todo, |buffer| drop(done.send(buffer)))
         };
         self.place = match std::thread::Builder::new().name("recording".into()).spawn(work) {
-            Ok(thread) => Place::Behind(Queue { jobs, spent, thread }),
+            Ok(thread) => Place::Behind(Queue { jobs, spent, thread, flushed: None }),
             Err(e) => {
                 log::warn!("{}: written by the thread of the run: {e}", self.path.display());
                 lock(&given).take().map_or(Place::Gone, Place::Here)
@@ -110,11 +116,30 @@ impl Sink {
         }
     }
 
-    /// Ends the chunk and hands everything up to time `t_s` to the operating system, at once or by the thread.
+    /// Announces a topic; the number of its channel.
+    pub fn topic(&mut self, topic: Topic) -> McapResult<u16> {
+        match &mut self.place {
+            Place::Here(encoder) => announce(encoder, &topic),
+            Place::Behind(_) => {
+                let (done, answer) = sync_channel(1);
+                self.ask(Job::Topic(topic, done))?;
+                self.answered(&answer)
+            }
+            Place::Gone => Ok(0),
+        }
+    }
+
+    /// Ends the chunk and hands everything up to time `t_s` to the operating system: at once, or by the thread, which has done so
+    /// with the chunk before when this returns.
     pub fn flush(&mut self, t_s: f64) -> McapResult<()> {
         match &mut self.place {
             Place::Here(encoder) => flush(encoder, &self.path, t_s, &self.progress),
-            Place::Behind(_) => self.ask(Job::Flush(t_s)),
+            Place::Behind(queue) => {
+                let (done, answer) = sync_channel(1);
+                let before = queue.flushed.replace(answer);
+                self.ask(Job::Flush(t_s, done))?;
+                before.map_or(Ok(()), |answer| self.answered(&answer))
+            }
             Place::Gone => Ok(()),
         }
     }
@@ -126,8 +151,15 @@ impl Sink {
         }
         let (done, answer) = sync_channel(1);
         self.ask(Job::Answer(done))?;
-        // an error on the way ends the thread, which answers nothing then
-        if answer.recv().is_err() { self.ended() } else { Ok(()) }
+        self.answered(&answer)
+    }
+
+    /// Waits for an answer of the thread; an error on the way ends it, and it answers nothing.
+    fn answered<T>(&mut self, answer: &Receiver<T>) -> McapResult<T> {
+        match answer.recv() {
+            Ok(answer) => Ok(answer),
+            Err(_) => Err(self.ended()),
+        }
     }
 
     /// What can be read whatever comes after; behind a queue it may lag what was flushed, until [`Sink::wait`].
@@ -166,16 +198,16 @@ impl Sink {
 
     fn ask(&mut self, job: Job) -> McapResult<()> {
         match &self.place {
-            Place::Behind(queue) if queue.jobs.send(job).is_err() => self.ended(),
+            Place::Behind(queue) if queue.jobs.send(job).is_err() => Err(self.ended()),
             _ => Ok(()),
         }
     }
 
     /// Why the thread has ended before its time.
-    fn ended(&mut self) -> McapResult<()> {
+    fn ended(&mut self) -> McapError {
         self.abandon();
         let why = lock(&self.progress).failed.take();
-        Err(why.unwrap_or_else(|| McapError::Io(std::io::Error::other("the thread of the recording has ended"))))
+        why.unwrap_or_else(|| McapError::Io(std::io::Error::other("the thread of the recording has ended")))
     }
 }
 
@@ -200,11 +232,11 @@ fn write_all(
                 spent(message);
                 written
             }
-            Job::Flush(t_s) => flush(&mut encoder, path, t_s, progress),
-            Job::Answer(done) => {
-                done.send(()).unwrap_or_default();
-                Ok(())
+            Job::Topic(topic, done) => {
+                announce(&mut encoder, &topic).and_then(|channel| tell(&done, channel))
             }
+            Job::Flush(t_s, done) => flush(&mut encoder, path, t_s, progress).and_then(|()| tell(&done, ())),
+            Job::Answer(done) => tell(&done, ()),
         };
         if let Err(e) = done {
             // the encoder ends before the error is told: what it still writes is cut off then
@@ -214,6 +246,17 @@ fn write_all(
         }
     }
     Some(encoder)
+}
+
+/// Answers whoever still waits; nobody does after an error.
+fn tell<T>(done: &SyncSender<T>, answer: T) -> McapResult<()> {
+    done.send(answer).ok();
+    Ok(())
+}
+
+fn announce(encoder: &mut Encoder, topic: &Topic) -> McapResult<u16> {
+    let schema = encoder.add_schema(&topic.schema, "protobuf", &topic.descriptor)?;
+    encoder.add_channel(schema, &topic.topic, "protobuf", &topic.metadata)
 }
 
 fn flush(encoder: &mut Encoder, path: &Path, t_s: f64, progress: &Mutex<Progress>) -> McapResult<()> {

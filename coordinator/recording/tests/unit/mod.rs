@@ -214,12 +214,13 @@ fn what_was_flushed_is_on_disk_before_the_end() {
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
     fixture.start(&mut recorder).expect("started");
-    for k in 1..=250 {
+    for k in 1..=450 {
         fixture.parts.iter_mut().for_each(|p| p.1.t = k as f64 * H);
         fixture.show(k, &mut recorder).expect("stepped");
     }
+    // the chunk that ended last may still be on its way
     let r = Recording::open(f.path()).expect("readable");
-    assert!((r.end_s() - 0.2).abs() < 1e-12);
+    assert!((r.end_s() - 0.2).abs() < 1e-12 || (r.end_s() - 0.4).abs() < 1e-12, "{}", r.end_s());
 }
 
 #[test]

@@ -263,18 +263,11 @@ impl Testbed {
             uncoupled::commit(&self.clock, (h, end), &mut self.subsystems)?;
             self.subsystems.read_states()?;
             self.sight.after_commit(&self.clock, (h, end), &mut self.subsystems)?;
-            self.collect_messages()?;
+            self.streams.collect(&self.subsystems.instances, |stream, bytes| {
+                self.signals.links.feed(stream, bytes)
+            })?;
         }
         Ok(outcome)
-    }
-
-    /// Messages of the step that was committed: for those who look at the run, and on their way to inputs.
-    fn collect_messages(&mut self) -> Result {
-        let Self { streams, signals, subsystems, .. } = self;
-        streams.collect(&subsystems.instances, |stream, bytes| {
-            let fed = signals.links.streams.iter_mut().filter(|link| link.stream() == stream);
-            fed.for_each(|link| link.take(bytes));
-        })
     }
 
     /// Steps until `until_s`, an error, or the cancel flag; tells the observers. The observers' `finished` is

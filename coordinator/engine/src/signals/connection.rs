@@ -158,6 +158,13 @@ pub struct Links {
     pub streams: Vec<StreamLink>,
 }
 
+impl Links {
+    /// Takes a message of a stream, by its number among all, on its way to the inputs that it feeds.
+    pub fn feed(&mut self, stream: usize, bytes: &[u8]) {
+        self.streams.iter_mut().filter(|link| link.stream() == stream).for_each(|link| link.take(bytes));
+    }
+}
+
 /// Name without the index of an element at its end, and that index: `a.b[2,1]` → `a.b`, `[2,1]`.
 fn element(name: &str) -> Option<(&str, &str)> {
     name.ends_with(']').then(|| name.rfind('[').map(|at| name.split_at(at))).flatten()

@@ -39,7 +39,8 @@ impl Testbed {
         self.streams.forget();
         self.signals.links.streams.iter_mut().for_each(StreamLink::forget);
         self.sight.begin(&self.clock, &mut self.subsystems)?;
-        self.collect_messages()
+        self.streams
+            .collect(&self.subsystems.instances, |stream, bytes| self.signals.links.feed(stream, bytes))
     }
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.

@@ -189,8 +189,9 @@ impl Keeper {
         match lasting.and_then(|()| replace(&self.path, &bytes::seal(FORM, MARK, &state))) {
             Ok(()) => self.written_s = Some(state.t_s),
             Err(e) => {
-                let left = self.written_s.map_or_else(String::new, |t| format!("; that of t = {t} s stays"));
-                log::warn!("{}: no checkpoint at t = {} s: {e}{left}", self.path.display(), state.t_s);
+                let left =
+                    self.written_s.map_or_else(String::new, |t| format!("; that of t = {t:.3} s stays"));
+                log::warn!("{}: no checkpoint at t = {:.3} s: {e}{left}", self.path.display(), state.t_s);
             }
         }
         Ok(())

@@ -372,8 +372,8 @@ fn print(arguments: &RunArguments, outcome: &Outcome, report: Option<&Path>) -> 
     Ok(())
 }
 
-/// CPU time of this thread, s; 0 where the system does not tell.
+/// CPU time of all threads of this process, s: that of the recording counts, too.
 pub fn cpu_s() -> f64 {
-    let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    let t = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
 }

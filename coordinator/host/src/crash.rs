@@ -9,11 +9,13 @@ use std::ptr;
 use std::sync::Once;
 
 /// Signals of a crash, with their names.
-const CRASHES: [(libc::c_int, &str); 4] = [
+const CRASHES: [(libc::c_int, &str); 5] = [
     (libc::SIGSEGV, "segmentation fault"),
     (libc::SIGBUS, "bus error"),
     (libc::SIGFPE, "arithmetic"),
     (libc::SIGILL, "illegal instruction"),
+    // abort(): a failed assert, an exception that nobody catches
+    (libc::SIGABRT, "abort"),
 ];
 
 /// Names that a message holds. Their place in memory stays as long as an instance lives. Without a name of an instance the

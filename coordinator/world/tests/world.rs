@@ -255,6 +255,33 @@ fn a_node_on_the_rim_of_a_tile_moves_the_cells_of_the_tiles_before_it() {
 }
 
 #[test]
+fn nothing_slips_through_level_ground_at_any_height() {
+    let mut random = Random::new(9);
+    for h in [0.0, -0.0, 1e-300, -1e-9, 1e-7, 0.25, -3.0, 1000.0] {
+        let mut heights = level([401, 401], 0.01);
+        heights.values.fill(h);
+        let world = ground(&heights, 1);
+        for k in 0..2000 {
+            // aimed at a point of the ground, at every second time at a node
+            let mut place = |low: f64| low + 0.01 * (1.0 + 398.0 * random_part(&mut random, k));
+            let target = [place(-1.0), place(-2.0), h];
+            let origin =
+                [random.between(-1.0, 3.0), random.between(-2.0, 2.0), h + random.between(0.01, 5.0)];
+            let way: [f64; 3] = std::array::from_fn(|c| target[c] - origin[c]);
+            let length = way.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let found = hit(&world, ray(origin, way.map(|c| c / length)), &RayMask::ALL);
+            assert!((found.distance - length).abs() < 1e-9 * (1.0 + h.abs()), "{h}: {found:?} for {length}");
+        }
+    }
+}
+
+/// A part of 1 in hundredths of a cell, or in whole cells of 398.
+fn random_part(random: &mut Random, k: usize) -> f64 {
+    let part = random.between(0.0, 1.0);
+    if k.is_multiple_of(2) { part } else { (398.0 * part).round() / 398.0 }
+}
+
+#[test]
 fn nothing_slips_through_the_ground_at_nodes_and_edges() {
     let mut random = Random::new(4);
     let mut heights = level([67, 40], 0.1);

@@ -32,11 +32,13 @@ def _plain(x):
         return {"tuple": [_plain(y) for y in x]}
     if isinstance(x, dict):
         return {"dict": [[_plain(k), _plain(v)] for k, v in x.items()]}
+    if isinstance(x, (bytes, bytearray)):
+        return {"raw": x.hex(), "mutable": isinstance(x, bytearray)}
     if isinstance(x, array.array):
         return {"array": x.typecode, "values": x.tolist()}
     if hasattr(x, "dtype") and hasattr(x, "tobytes"):
         return {"numpy": str(x.dtype), "shape": list(x.shape), "bytes": x.tobytes().hex()}
-    raise TypeError(f"the state holds a {type(x).__name__}; numbers, texts, lists, tuples, dictionaries and arrays can be kept")
+    raise TypeError(f"the state holds a {type(x).__name__}; numbers, texts, bytes, lists, tuples, dictionaries and arrays can be kept")
 
 
 def _rich(x):
@@ -48,6 +50,8 @@ def _rich(x):
         return tuple(_rich(y) for y in x["tuple"])
     if "dict" in x:
         return {_rich(k): _rich(v) for k, v in x["dict"]}
+    if "raw" in x:
+        return (bytearray if x["mutable"] else bytes).fromhex(x["raw"])
     if "array" in x:
         return array.array(x["array"], x["values"])
     import numpy

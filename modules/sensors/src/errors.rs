@@ -48,7 +48,9 @@ impl Errors {
         if model.noise > 0.0 {
             value += model.noise * self.normal(channel, sample);
         }
-        if model.quantum > 0.0 { (value / model.quantum).round() * model.quantum } else { value }
+        let rounded = (value / model.quantum).round() * model.quantum;
+        // a quantum of 0, or one so small that its multiples are no numbers, rounds nothing
+        if rounded.is_finite() { rounded } else { value }
     }
 
     /// A number of the normal distribution (Box and Muller, 1958) that belongs to a channel and a sample.

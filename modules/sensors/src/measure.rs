@@ -1,13 +1,25 @@
 //! What the sensors that sit on a body find in the world, without any error.
 
 use crate::kind::{MOST, SensorKind};
-use terraglue_subsystem::{Mount, Ray, RayHit, RayMask, Result, World};
+use terraglue_subsystem::{Mount, Pose, Ray, RayHit, RayMask, Result, World, persist};
 
-/// Velocity of the sensor and its time at the last sample: an accelerometer tells the mean between two samples.
+/// The sensor at its last sample: an accelerometer tells the mean between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Before {
     pub time: f64,
     pub velocity: [f64; 3],
+    pub orientation: [f64; 4],
+}
+persist!(Before { time, velocity, orientation });
+
+impl Before {
+    /// The orientation half way from there to another, which is less than half a turn away.
+    fn half_way(&self, to: [f64; 4]) -> [f64; 4] {
+        let along: f64 = (0..4).map(|k| self.orientation[k] * to[k]).sum();
+        let sum: [f64; 4] = std::array::from_fn(|k| self.orientation[k] * along.signum() + to[k]);
+        let length = sum.iter().map(|c| c * c).sum::<f64>().sqrt();
+        sum.map(|c| c / length)
+    }
 }
 
 /// True values of all channels at a time, and the switch.
@@ -16,8 +28,8 @@ pub(crate) struct Truth {
     pub switch: bool,
 }
 
-/// Specific force and angular rate in the axes of the sensor. Without a sample before, or at its time, the sensor counts as not
-/// accelerated.
+/// Specific force, the mean since the sample before in the axes half way, and angular rate, both in the axes of the sensor. Without a
+/// sample before, or at its time, the sensor counts as not accelerated.
 pub(crate) fn imu(
     mount: &mut Mount,
     world: &dyn World,
@@ -27,13 +39,16 @@ pub(crate) fn imu(
 ) -> Result<Truth> {
     let state = mount.state(world, time)?;
     let velocity = state.linear_velocity;
-    let acceleration = match before {
-        Some(b) if time > b.time => [0, 1, 2].map(|k| (velocity[k] - b.velocity[k]) / (time - b.time)),
-        _ => [0.0; 3],
+    let orientation = state.world_from_body.orientation;
+    let (acceleration, axes) = match before {
+        Some(b) if time > b.time => {
+            ([0, 1, 2].map(|k| (velocity[k] - b.velocity[k]) / (time - b.time)), b.half_way(orientation))
+        }
+        _ => ([0.0; 3], orientation),
     };
-    *before = Some(Before { time, velocity });
+    *before = Some(Before { time, velocity, orientation });
     let felt = [0, 1, 2].map(|k| acceleration[k] - gravity[k]);
-    let [x, y, z] = state.world_from_body.turned_back(felt);
+    let [x, y, z] = Pose { orientation: axes, ..Pose::IDENTITY }.turned_back(felt);
     let [p, q, r] = state.world_from_body.turned_back(state.angular_velocity);
     Ok(Truth { values: [x, y, z, p, q, r], switch: false })
 }
@@ -52,5 +67,6 @@ pub(crate) fn range(mount: &mut Mount, world: &dyn World, time: f64, range_m: f6
 /// What a sensor makes of its inputs.
 pub(crate) fn inputs(kind: SensorKind, values: [f64; MOST], threshold_n: f64, was: bool) -> Truth {
     let limit = if was { 0.5 * threshold_n } else { threshold_n };
-    Truth { values, switch: kind == SensorKind::ContactSwitch && values[0] >= limit }
+    let pressed = values[0] > 0.0 && values[0] >= limit;
+    Truth { values, switch: kind == SensorKind::ContactSwitch && pressed }
 }

@@ -11,7 +11,7 @@ use terraglue_subsystem::{
 };
 
 /// Form of the serialized state.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Part of a period by which rounding may bring a sample forward.
 const EARLY: f64 = 1e-6;
 
@@ -41,8 +41,8 @@ struct State {
     inputs: [f64; MOST],
     /// Number of the next sample.
     next: u64,
-    /// Time and velocity of the sample before, where it moves.
-    before: Option<(f64, [f64; 3])>,
+    /// The sample before, of an IMU.
+    before: Option<Before>,
     /// The switch without delay.
     closed: bool,
     shown: [f64; MOST],
@@ -96,6 +96,11 @@ impl Sensor {
         for (k, value) in values.iter_mut().take(channels).enumerate() {
             *value = self.errors.shown(k, number, *value);
         }
+        if self.settings.kind == SensorKind::RangeFinder {
+            // what has met nothing has no errors, and no error leads out of the range
+            let range = self.settings.range_m;
+            values[0] = if truth.switch { values[0].clamp(0.0, range) } else { range };
+        }
         self.state.next = number + 1;
         self.state.closed = truth.switch;
         let due = time + self.settings.delay_s;
@@ -117,10 +122,7 @@ impl Sensor {
         if *kind == SensorKind::RangeFinder {
             return measure::range(mount, world, time, *range_m);
         }
-        let mut before = state.before.map(|(time, velocity)| Before { time, velocity });
-        let truth = measure::imu(mount, world, time, *gravity, &mut before)?;
-        state.before = before.map(|b| (b.time, b.velocity));
-        Ok(truth)
+        measure::imu(mount, world, time, *gravity, &mut state.before)
     }
 }
 

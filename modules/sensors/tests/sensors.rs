@@ -107,7 +107,8 @@ fn an_imu_feels_acceleration_less_gravity_in_its_own_axes() {
     let mount = format!(r#""mount": "robot.body", "mount_offset": [0, 0, 0, {quarter}, 0, -{quarter}, 0]"#);
     let mut imu = sensor(&format!(r#"{{"kind": "imu", {mount}, "rate_hz": 100}}"#));
     fly(imu.as_mut(), 500);
-    let angle = TURN * 0.5_f64;
+    // half way from the sample before
+    let angle = TURN * 0.495_f64;
     let (forward, side) = (6.0 * angle.cos(), -6.0 * angle.sin());
     let near = |name: &str, expected: f64| {
         let got = get(imu.as_ref(), name);
@@ -119,6 +120,34 @@ fn an_imu_feels_acceleration_less_gravity_in_its_own_axes() {
     near("rate_x", TURN);
     near("rate_y", 0.0);
     near("rate_z", 0.0);
+}
+
+#[test]
+fn a_range_finder_that_meets_nothing_has_no_errors_and_none_leads_out_of_its_range() {
+    // along x of the body, where nothing is, and down
+    let down = std::f64::consts::FRAC_1_SQRT_2;
+    let noisy =
+        r#""kind": "range-finder", "mount": "robot.body", "noise": 2.0, "range_m": 3.0, "rate_hz": 0"#;
+    let up = sensor(&format!("{{{noisy}}}"));
+    let near = sensor(&format!(r#"{{{noisy}, "mount_offset": [0, 0, -0.5, {down}, 0, {down}, 0]}}"#));
+    for (mut finder, hits) in [(up, false), (near, true)] {
+        fly(finder.as_mut(), 0);
+        for k in 0..50 {
+            fly_step(finder.as_mut(), k);
+            let distance = get(finder.as_ref(), "distance");
+            assert_eq!(switch(finder.as_ref(), "hit"), hits);
+            assert!((0.0..=3.0).contains(&distance) && (hits || distance == 3.0), "{distance}");
+        }
+    }
+}
+
+#[test]
+fn a_switch_without_a_threshold_is_open_without_a_force() {
+    let mut contact = sensor(r#"{"kind": "contact-switch", "threshold_n": 0, "rate_hz": 0}"#);
+    feed(contact.as_mut(), 0, 0.0);
+    assert!(!switch(contact.as_ref(), "contact"));
+    feed(contact.as_mut(), 1, 0.1);
+    assert!(switch(contact.as_ref(), "contact"));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::sight::Question;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
 use super::{Link, Start};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::time::Instant;
 use terraglue_subsystem::{
     Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
@@ -20,6 +20,8 @@ pub struct Isolated {
     about: ModuleInfo,
     tiles: Tiles,
     messages: Messages,
+    /// Whether it was told that there are no overlays for an error.
+    told: Cell<bool>,
 }
 
 /// What never changes over its life.
@@ -78,7 +80,7 @@ impl Isolated {
             },
         )?;
         let messages = Messages::new(about.streams.len());
-        Ok(Self { link: RefCell::new(link), about, tiles, messages })
+        Ok(Self { link: RefCell::new(link), about, tiles, messages, told: Cell::new(false) })
     }
 
     /// A call after which fields may have changed, and streams have other messages.
@@ -255,7 +257,12 @@ impl Subsystem for Isolated {
 
     fn overlays(&self, out: &mut Vec<Overlay>) {
         let shown: Result<Vec<Overlay>> = self.link.borrow_mut().call(Call::Overlays, |_| {}, |r| r.take());
-        out.extend(shown.into_iter().flatten());
+        match shown {
+            Ok(shown) => out.extend(shown),
+            // what is only looked at ends no run
+            Err(e) if !self.told.replace(true) => log::warn!("overlays failed, and are not drawn: {e}"),
+            Err(_) => {}
+        }
     }
 
     fn save_state(&mut self, slot: u32) -> Result {

@@ -47,12 +47,9 @@ impl Recorder {
     pub fn state(&mut self, view: &View) -> Result<RecorderState> {
         let mut summary = Block::default();
         self.summary.keep(&mut summary.0);
-        Ok(RecorderState {
-            mcap: self.mcap.state(view)?,
-            csv: self.csv.as_mut().map(VariablesCsv::length).transpose()?,
-            summary,
-            recorded_step: self.recorded_step,
-        })
+        let mcap = self.mcap.state(view).map_err(|e| self.explained(e))?;
+        let csv = self.csv.as_mut().map(VariablesCsv::length).transpose().map_err(|e| self.explained(e))?;
+        Ok(RecorderState { mcap, csv, summary, recorded_step: self.recorded_step })
     }
 
     /// Goes on in a folder that another process has recorded into; `view` is the moment of the state. All that was written

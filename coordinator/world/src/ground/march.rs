@@ -15,6 +15,8 @@ use glam::{Vec4, vec4};
 const OVERLAP: f64 = 1e-6;
 /// And by this share of their distance and height: five times what single precision can lose.
 const ROUNDING: f32 = 1e-6;
+/// And by this much in height, m: at height 0 there is no share.
+const LIFT: f32 = 1e-6;
 
 /// A block that waits.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,7 +45,7 @@ impl Way {
     #[inline(always)]
     fn new(line: Line, inverse: [f64; 3], [low, high]: [f32; 2]) -> Self {
         let start = line.origin[2] as f32;
-        let room = ROUNDING * (start.abs() + low.abs() + high.abs());
+        let room = ROUNDING * (start.abs() + low.abs() + high.abs()) + LIFT;
         Self {
             line,
             sheared: Sheared::new(&line),
@@ -103,7 +105,7 @@ impl Ground {
         let scaled = Line { origin, direction: [d[0] / spacing, d[1] / spacing, d[2]] };
         let inverse = scaled.inverse();
         let [low, high] = self.above.whole();
-        let room = ROUNDING * (low.abs() + high.abs());
+        let room = ROUNDING * (low.abs() + high.abs()) + LIFT;
         let cells = self.lattice.size.map(|n| f64::from(n.saturating_sub(1)));
         let bounds = Bounds {
             low: [-OVERLAP, -OVERLAP, f64::from(low - room)],

@@ -41,7 +41,7 @@ fn of_case(id: &str, rows: &[Row]) -> Vec<Figure> {
             format!("{id}.{name}"),
             value,
             Limit::None,
-            format!("CPU time of a step with recording: {what}"),
+            format!("CPU time of the stepping thread in a step with recording: {what}"),
         )
     };
     let whole = |name: &str, of: &dyn Fn(&Row) -> f64, what: &str| figure(name, row(rows, WHOLE, of), what);

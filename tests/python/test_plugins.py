@@ -60,20 +60,22 @@ def test_a_new_module_in_rust_builds_runs_and_passes(tmp_path, rust_target, kind
     played(place, commands)
 
 
-def test_a_crash_tells_the_module_the_call_and_the_time(tmp_path):
+@pytest.mark.parametrize("fault, signal, name", [("*(volatile int *)(size_t)(st->t * 20) = 1", 11, "segmentation fault"),
+                                                 ("__builtin_abort()", 6, "abort")])
+def test_a_crash_tells_the_module_the_call_and_the_time(tmp_path, fault, signal, name):
     place, _ = made(tmp_path, "controller", "c")
     source, = place.glob("*.c")
-    wild = r"\1    if (st->t > 0.25) *(volatile int *)(size_t)(st->t * 20) = 1;\n"
+    wild = rf"\1    if (st->t > 0.25) {fault};\n"
     text, count = re.subn(r"(static tg_status commit\(.*\{\n)", wild, source.read_text())
     assert count == 1
     source.write_text(text)
     subprocess.run(["make"], cwd=place, check=True, capture_output=True)
     crashed = terraglue("run", "scenario.toml", "--quiet", cwd=place)
-    assert crashed.returncode == -11, crashed.stderr
-    for words in ("signal 11", "`commit` of `controller` (my-controller) at t = 0.25", "`isolate = true` in [controller]"):
+    assert crashed.returncode == -signal, crashed.stderr
+    for words in (f"signal {signal} ({name})", "`commit` of `controller` (my-controller) at t = 0.25", "`isolate = true` in [controller]"):
         assert words in crashed.stderr, crashed.stderr
     kept = terraglue("run", "scenario.toml", "--quiet", "--set", "controller.isolate=true", cwd=place)
-    assert kept.returncode == 1 and "segmentation fault" in kept.stderr and "crashed:" not in kept.stderr, kept.stderr
+    assert kept.returncode == 1 and f"signal {signal}" in kept.stderr and "crashed:" not in kept.stderr, kept.stderr
 
 
 @pytest.mark.parametrize("function", ["dlopen", "terraglue_subsystem", "schema", "instantiate"])

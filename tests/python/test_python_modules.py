@@ -1,5 +1,7 @@
 """Modules in Python: made, run and checked as the others; what fails says where; nothing is left behind."""
 
+import array
+import importlib
 import json
 import pathlib
 import re
@@ -216,3 +218,11 @@ def test_the_controller_of_the_page_runs(tmp_path):
     assert process.returncode == 0, process.stderr
     rows = (tmp_path / "out" / "variables.csv").read_text().splitlines()
     assert "counter.angle" in rows[0]
+
+
+@pytest.mark.parametrize("state", [b"\x00scan", bytearray(b"ab"), {"scan": b"", "t": 0.1}, (1, [2.5, "x", None]), array.array("d", [0.1, -0.0])])
+def test_what_a_state_may_hold_comes_back_as_it_was(monkeypatch, state):
+    monkeypatch.syspath_prepend(str(ROOT / "interfaces/plugin/python"))
+    worker = importlib.import_module("terraglue_worker")
+    back = worker._rich(json.loads(json.dumps(worker._plain(state))))
+    assert back == state and type(back) is type(state)

@@ -220,3 +220,28 @@ def test_a_fault_that_a_stream_cannot_have_is_refused(tmp_path):
     done = terraglue("check", tmp_path / "mapping.toml", "--set", fault)
     assert done.returncode == 2
     assert "`freeze` and `drop-out`" in done.stderr, done.stderr
+
+
+def scanned(folder, stream):
+    """A short run of the scanner with another `stream`, and with two streams of up to 100 MB."""
+    text = SCANNER.replace('rate_hz=10.0, most_bytes=216)]', 'rate_hz=0.0, most_bytes=100_000_000), tg.Stream("other", "test.Cloud", "raw", '
+                           'rate_hz=0.0, most_bytes=100_000_000)]')
+    start = text.index("        return None if self.state")
+    (folder / "scanner.py").write_text(text[:start] + f"        {stream}\n")
+    (folder / "mapper.py").write_text(MAPPER)
+    (folder / "cart.urdf").write_text(CART)
+    (folder / "mapping.toml").write_text(SCENARIO)
+    return terraglue("run", folder / "mapping.toml", "--duration", "0.03", "--quiet", "--no-report", "--out", folder / "out")
+
+
+def test_messages_that_are_too_long_together_are_left_out_and_stop_no_step(tmp_path):
+    done = scanned(tmp_path, "return (self.state['time'], bytes(24 if k == 0 else 80_000_000)) if self.state['time'] == 0.0 else None")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("is left out") == 1 and "stream `other`" in done.stderr, done.stderr
+
+
+def test_a_message_that_is_none_is_told_with_its_stream(tmp_path):
+    for wrong in ("'text'", "5", "(0.0, 5)"):
+        done = scanned(tmp_path, f"return {wrong}")
+        said = " ".join(done.stderr.replace("│", " ").split())
+        assert done.returncode == 1 and "stream `cloud`" in said and "(time, bytes)" in said, said

@@ -113,6 +113,8 @@ class Worker:
         self.generation = 0
         self.file = ""
         self.segment, self.revision, self.others = None, None, []
+        # streams of which a message was too long
+        self.left_out = set()
         self.calls = [getattr(self, "_" + name, None) for name in self.NAMES]
 
     def answer(self, request, length, memory):
@@ -296,17 +298,23 @@ class Worker:
 
     def _messages(self, reply):
         """What the last step made on the streams."""
-        for k in range(len(self.subsystem.streams)):
+        for k, info in enumerate(self.subsystem.streams):
             try:
                 message = self.subsystem.stream(k)
+                time, data = (0.0, b"") if message is None else (float(message[0]), memoryview(message[1]).tobytes())
             except Exception as e:  # the host tells it as the failure of `stream`
                 reply.u8(2)
-                reply.text(str(e) or type(e).__name__)
+                reply.text(f"stream `{info.name}`: {e or type(e).__name__}; a message is None or (time, bytes)")
                 continue
-            reply.u8(message is not None)
-            if message is not None:
-                reply.numbers(message[0])
-                reply.text(bytes(message[1]))
+            # room for the beginnings of the others, and for what is logged
+            fits = reply.at + len(data) + 65536 < len(reply.memory)
+            if not fits and k not in self.left_out:
+                self.left_out.add(k)
+                self.host.log(f"stream `{info.name}`: a message of {len(data)} bytes is left out: those of a step have room for {len(reply.memory)}", WARNING)
+            reply.u8(message is not None and fits)
+            if message is not None and fits:
+                reply.numbers(time)
+                reply.text(data)
 
     def _ask(self, question, *parts):
         """Asks the host while it waits for the end of `observe`; its answer."""

@@ -301,10 +301,15 @@ class Worker:
         for k, info in enumerate(self.subsystem.streams):
             try:
                 message = self.subsystem.stream(k)
-                time, data = (0.0, b"") if message is None else (float(message[0]), memoryview(message[1]).tobytes())
             except Exception as e:  # the host tells it as the failure of `stream`
                 reply.u8(2)
-                reply.text(f"stream `{info.name}`: {e or type(e).__name__}; a message is None or (time, bytes)")
+                reply.text(str(e) or type(e).__name__)
+                continue
+            try:
+                time, data = (0.0, b"") if message is None else (float(message[0]), memoryview(message[1]).tobytes())
+            except (TypeError, ValueError, IndexError):
+                reply.u8(2)
+                reply.text(f"stream `{info.name}`: a message is None or (time, bytes), and not a {type(message).__name__} such as {message!r:.50}")
                 continue
             # room for the beginnings of the others, and for what is logged
             fits = reply.at + len(data) + 65536 < len(reply.memory)

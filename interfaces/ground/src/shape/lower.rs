@@ -8,7 +8,7 @@ use crate::math::{cross, dot};
 use terraglue_subsystem::Geometry;
 
 /// Slopes below this are walls along the line: rounding would exceed the accuracy of the quotient.
-const WALL: f64 = 1e-10;
+pub(super) const WALL: f64 = 1e-10;
 
 impl Placed {
     /// World height of the underside above (x, y), m; `None` where the vertical line misses the shape.

@@ -1,13 +1,10 @@
 //! The faces of a convex mesh at its pose, as heights over a point: the underside is the highest of the planes that look down.
 
 use super::Face;
+use super::lower::WALL;
+use super::slope::EDGE;
 use crate::math::Rotation;
 
-/// Faces whose normal rises or falls by less than this are walls along a vertical line: rounding would exceed the accuracy of the
-/// quotient.
-const WALL: f64 = 1e-10;
-/// Planes whose heights differ by less than this (m) meet in an edge: the flatter one counts.
-const EDGE: f64 = 1e-9;
 /// Planes that are looked at side by side.
 const LANES: usize = 4;
 
@@ -57,9 +54,14 @@ impl Planes {
         self.up.fill_lane(f64::INFINITY);
     }
 
+    /// Height of the highest plane that looks down.
+    fn highest_down(&self, x: f64, y: f64) -> f64 {
+        self.down.fold(f64::NEG_INFINITY, x, y, |best, z| if z > best { z } else { best })
+    }
+
     /// Height of the underside; none where the vertical line misses the mesh.
     pub fn lower(&self, x: f64, y: f64) -> Option<f64> {
-        let low = self.down.fold(f64::NEG_INFINITY, x, y, |best, z| if z > best { z } else { best });
+        let low = self.highest_down(x, y);
         let high = self.up.fold(f64::INFINITY, x, y, |best, z| if z < best { z } else { best });
         let between_walls = self.walls.iter().all(|[a, b, offset]| a * x + b * y <= *offset);
         (between_walls && low <= high && low.is_finite()).then_some(low)
@@ -67,7 +69,7 @@ impl Planes {
 
     /// Slope of the underside at (x, y); on an edge, that of the flattest face.
     pub fn slope(&self, x: f64, y: f64) -> [f64; 2] {
-        let low = self.down.fold(f64::NEG_INFINITY, x, y, |best, z| if z > best { z } else { best });
+        let low = self.highest_down(x, y);
         let steepness = |[a, b]: [f64; 2]| a * a + b * b;
         let meeting = self.down.at(x, y).filter(|(z, _)| *z >= low - EDGE).map(|(_, slope)| slope);
         meeting.min_by(|one, other| steepness(*one).total_cmp(&steepness(*other))).unwrap_or_default()

@@ -7,7 +7,7 @@ use terraglue_subsystem::Geometry;
 pub const STEEPEST_SLOPE: f64 = 3.0;
 
 /// Faces whose distance from the point differs by less than this (m) count as equally near: an edge.
-const EDGE: f64 = 1e-9;
+pub(super) const EDGE: f64 = 1e-9;
 
 impl Placed {
     /// ∂z/∂x and ∂z/∂y of the underside at its point `p` (world, m), at most [`STEEPEST_SLOPE`] steep. On an edge,

@@ -7,35 +7,16 @@ mod fixture;
 use fixture::*;
 use std::path::Path;
 use terraglue_compare::{COMPARE_JSON, COMPARE_PAGE, COMPARE_TABLE, CompareRow, terminal_table, write};
-use terraglue_recording::{FailureRecord, Recorder, RecorderOptions, Status, Summary};
-
-fn record(folder: &Path, strategy: &str, steps: u64) -> Summary {
-    let mut fixture = Fixture::new(strategy);
-    let mut recorder =
-        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.run(&mut recorder, steps).expect("ran");
-    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
-}
+use terraglue_recording::{FailureRecord, Recorder, RecorderOptions, RecorderState, Status, Summary};
 
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("temporary folder")
 }
 
-/// A run of single passes on a soil without a ledger.
-fn record_unknown(folder: &Path) -> Summary {
-    let mut fixture = Fixture::new("cooperative");
-    fixture.single_pass = true;
-    fixture.parts[2].1.silent = true;
-    let mut recorder =
-        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.run(&mut recorder, 100).expect("ran");
-    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
-}
-
 #[test]
 fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     let f = folder();
-    let s = record_unknown(f.path());
+    let s = Fixture::unknown().recorded(f.path(), RecorderOptions::default(), 100);
     let row = CompareRow { summary: Some(s), ..Default::default() };
     let table = terminal_table(&[row], true);
     let gap = table.lines().find(|l| l.contains("largest gap")).expect("line");
@@ -50,7 +31,7 @@ fn compared(f: &Path) -> Vec<CompareRow> {
     let mut rows = Vec::new();
     for strategy in ["cooperative", "iterative"] {
         let folder = f.join(strategy);
-        let summary = record(&folder, strategy, 2000);
+        let summary = Fixture::new(strategy).recorded(&folder, RecorderOptions::default(), 2000);
         rows.push(CompareRow {
             strategy: strategy.into(),
             soil: "soil-bekker".into(),

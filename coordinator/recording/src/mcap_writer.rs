@@ -29,7 +29,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::{Event, StreamView, View};
+use terraglue_engine::observer::{Event, View};
 use terraglue_gluing::StepReport;
 use terraglue_numerics::rotation;
 use terraglue_scenario::Scenario;
@@ -177,18 +177,6 @@ impl McapWriter {
         self.checked(channel)
     }
 
-    fn add_stream(&mut self, stream: &StreamView) -> Result {
-        let Some(encoder) = self.sink.encoder() else { return Ok(()) };
-        let (encoding, data) = stream_topics::schema(&stream.info);
-        let topic = stream_topics::name(&stream.name);
-        let schema = encoder.add_schema(&stream.info.schema, encoding, &data);
-        let about = BTreeMap::from([(topics::STREAM.to_owned(), stream.name.clone())]);
-        let channel = schema.and_then(|s| encoder.add_channel(s, &topic, &stream.info.encoding, &about));
-        let channel = self.checked(channel)?;
-        self.channels.streams.push(channel);
-        Ok(())
-    }
-
     /// Writes the messages of all streams since the step before; called for every step.
     pub fn streams(&mut self, view: &View) -> Result {
         for (k, stream) in view.streams.iter().enumerate() {
@@ -265,7 +253,11 @@ impl McapWriter {
             let channel = self.add(topic)?;
             self.channels.joints.push(channel);
         }
-        view.streams.iter().try_for_each(|stream| self.add_stream(stream))
+        for stream in view.streams {
+            let channel = self.add(stream_topics::topic(stream))?;
+            self.channels.streams.push(channel);
+        }
+        Ok(())
     }
 
     fn variables(

@@ -17,15 +17,26 @@ pub(crate) const SUBSYSTEM: &str = "subsystem";
 /// Key of a channel's metadata: the full name of a stream.
 pub(crate) const STREAM: &str = "stream";
 
-/// Topic, name of the message type, and its file of descriptors.
+/// A topic with the type of its messages.
 pub(crate) struct Topic {
     pub topic: String,
+    /// Name of the message type.
     pub schema: String,
-    pub descriptor: Vec<u8>,
+    pub schema_encoding: &'static str,
+    /// Of protobuf, its file of descriptors.
+    pub schema_data: Vec<u8>,
+    /// Of the messages.
+    pub encoding: String,
     pub metadata: BTreeMap<String, String>,
 }
 
 impl Topic {
+    /// Of protobuf, with the file of descriptors of the message type.
+    fn protobuf(topic: String, schema: String, descriptor: Vec<u8>) -> Self {
+        let (schema_encoding, encoding) = ("protobuf", "protobuf".into());
+        Self { topic, schema, schema_encoding, schema_data: descriptor, encoding, metadata: BTreeMap::new() }
+    }
+
     /// The same with one more line of metadata.
     pub fn with(mut self, key: &str, value: String) -> Self {
         self.metadata.insert(key.into(), value);
@@ -36,7 +47,7 @@ impl Topic {
 /// A topic of messages that viewers know.
 pub(crate) fn of<M: Encode>(topic: &str) -> Topic {
     let (schema, descriptor) = M::get_schema().map(|s| (s.name, s.data.into_owned())).unwrap_or_default();
-    Topic { topic: topic.into(), schema, descriptor, metadata: BTreeMap::new() }
+    Topic::protobuf(topic.into(), schema, descriptor)
 }
 
 /// `/scene`: the shapes of all bodies, fixed to the frames of `/tf`.
@@ -66,22 +77,13 @@ pub(crate) fn force_points() -> Topic {
 
 /// `/gluing`: how the recorded step was glued.
 pub(crate) fn gluing() -> Topic {
-    Topic {
-        topic: "/gluing".into(),
-        schema: gluing_message::SCHEMA.into(),
-        descriptor: gluing_message::descriptor(),
-        metadata: BTreeMap::new(),
-    }
+    Topic::protobuf("/gluing".into(), gluing_message::SCHEMA.into(), gluing_message::descriptor())
 }
 
 fn named(topic: String, package: &str, name: &str, columns: &Columns, about: &[About]) -> Topic {
     let text = serde_json::to_string(about).unwrap_or_default();
-    Topic {
-        topic,
-        schema: format!("{package}.{name}"),
-        descriptor: columns.descriptor(package, name),
-        metadata: BTreeMap::from([(COLUMNS.to_owned(), text)]),
-    }
+    let descriptor = columns.descriptor(package, name);
+    Topic::protobuf(topic, format!("{package}.{name}"), descriptor).with(COLUMNS, text)
 }
 
 /// `/energy`: energies and works, J; the sum and each subsystem.

@@ -73,7 +73,7 @@ impl Sink {
         Self { path: path.to_owned(), place: Place::Here(Box::new(encoder)), progress: Arc::default() }
     }
 
-    /// The encoder before [`Sink::start`], for what announces topics; none later.
+    /// The encoder before [`Sink::start`], for what another process has written; none later.
     pub fn encoder(&mut self) -> Option<&mut Encoder> {
         match &mut self.place {
             Place::Here(encoder) => Some(encoder),
@@ -87,18 +87,21 @@ impl Sink {
         let (jobs, todo) = sync_channel(WAITING);
         let (done, spent) = channel();
         let (path, progress) = (self.path.clone(), Arc::clone(&self.progress));
-        // handed over by a cell: a thread that cannot be made drops what it was given
-        let given = Arc::new(Mutex::new(Some(encoder)));
-        let taken = Arc::clone(&given);
+        // handed over once there is a thread: one that cannot be made drops what it was given
+        let (give, given) = sync_channel(1);
         let work = move || {
-            let encoder = lock(&taken).take()?;
+            let encoder = given.recv().ok()?;
             write_all(encoder, &path, &progress, &todo, |buffer| drop(done.send(buffer)))
         };
         self.place = match std::thread::Builder::new().name("recording".into()).spawn(work) {
-            Ok(thread) => Place::Behind(Queue { jobs, spent, thread, flushed: None }),
+            Ok(thread) => {
+                // it takes the encoder before it can end
+                give.send(encoder).ok();
+                Place::Behind(Queue { jobs, spent, thread, flushed: None })
+            }
             Err(e) => {
                 log::warn!("{}: written by the thread of the run: {e}", self.path.display());
-                lock(&given).take().map_or(Place::Gone, Place::Here)
+                Place::Here(encoder)
             }
         };
     }
@@ -255,8 +258,8 @@ fn tell<T>(done: &SyncSender<T>, answer: T) -> McapResult<()> {
 }
 
 fn announce(encoder: &mut Encoder, topic: &Topic) -> McapResult<u16> {
-    let schema = encoder.add_schema(&topic.schema, "protobuf", &topic.descriptor)?;
-    encoder.add_channel(schema, &topic.topic, "protobuf", &topic.metadata)
+    let schema = encoder.add_schema(&topic.schema, topic.schema_encoding, &topic.schema_data)?;
+    encoder.add_channel(schema, &topic.topic, &topic.encoding, &topic.metadata)
 }
 
 fn flush(encoder: &mut Encoder, path: &Path, t_s: f64, progress: &Mutex<Progress>) -> McapResult<()> {

@@ -1,11 +1,14 @@
 //! A synthetic testbed in closed form: a body that walks along x at constant speed on six feet, and a soil with
 //! tiles that take footprints. Every figure that a recording derives from it is known beforehand.
 
+use super::{Recorder, RecorderOptions, RecorderState, Status, Summary};
+use std::path::Path;
 use terraglue_diagnostics::error::Result;
 use terraglue_engine::observer::StreamView;
 use terraglue_engine::observer::{Event, Observer, SubsystemView, View, ledger_of};
 use terraglue_gluing::{PortReport, StepReport};
 use terraglue_scenario::*;
+use terraglue_subsystem::bytes::Persist;
 use terraglue_subsystem::*;
 
 pub const SPEED: f64 = 0.15;
@@ -377,6 +380,40 @@ impl Fixture {
             scene,
             iterations: u32::from(strategy == "iterative"),
         }
+    }
+
+    /// Single passes on a soil without an energy ledger.
+    pub fn unknown() -> Self {
+        let mut fixture = Self::new("cooperative");
+        fixture.single_pass = true;
+        fixture.parts[2].1.silent = true;
+        fixture
+    }
+
+    /// A whole run that is recorded.
+    pub fn recorded(&mut self, folder: &Path, options: RecorderOptions, steps: u64) -> Summary {
+        let mut recorder = Recorder::create(folder, &self.scenario, options).expect("created");
+        self.run(&mut recorder, steps).expect("ran");
+        recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
+    }
+
+    /// The same by two recorders, of which the second goes on after step `at` from the state of the first.
+    pub fn recorded_twice(&mut self, folder: &Path, options: RecorderOptions, at: u64, steps: u64) {
+        let mut recorder = Recorder::create(folder, &self.scenario, options).expect("created");
+        self.start(&mut recorder).expect("started");
+        self.steps(&mut recorder, 0, at).expect("stepped");
+        let (mut state, mut again) = (Vec::new(), None);
+        self.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
+        // its end is written, and has to be cut off
+        drop(recorder);
+        self.view(at, &mut |view| {
+            let state = RecorderState::read(&mut state.as_slice()).expect("the same");
+            Recorder::resume(folder, &self.scenario, options, view, state).map(|r| again = Some(r))
+        })
+        .expect("resumed");
+        let mut recorder = again.expect("a recorder");
+        self.go_on(&mut recorder, at, steps).expect("ran");
+        recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
     }
 
     /// World position of a foot and whether it stands: tripods of 0.5 s.

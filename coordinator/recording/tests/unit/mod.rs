@@ -10,12 +10,7 @@ use std::path::Path;
 use terraglue_numerics::extremes::larger;
 
 fn record(folder: &Path, strategy: &str, steps: u64) -> Summary {
-    let mut fixture = Fixture::new(strategy);
-    let mut recorder =
-        Recorder::create(folder, &fixture.scenario, RecorderOptions { csv: true, ..Default::default() })
-            .expect("created");
-    fixture.run(&mut recorder, steps).expect("ran");
-    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
+    Fixture::new(strategy).recorded(folder, RecorderOptions { csv: true, ..Default::default() }, steps)
 }
 
 fn folder() -> tempfile::TempDir {
@@ -38,30 +33,13 @@ fn equal_runs_give_equal_bytes() {
 
 #[test]
 fn a_recorder_goes_on_in_another_process_to_the_same_bytes() {
-    use terraglue_subsystem::bytes::Persist;
     let whole = folder();
     record(whole.path(), "iterative", 1203);
     let options = RecorderOptions { csv: true, checkpoints: true };
     // at, between and across the ends of chunks, records of the ground and the event
     for at in [1, 37, 251, 699, 1000] {
         let f = folder();
-        let mut fixture = Fixture::new("iterative");
-        let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
-        fixture.start(&mut recorder).expect("started");
-        fixture.steps(&mut recorder, 0, at).expect("stepped");
-        let (mut state, mut again) = (Vec::new(), None);
-        fixture.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
-        // its end is written, and has to be cut off
-        drop(recorder);
-        fixture
-            .view(at, &mut |view| {
-                let state = RecorderState::read(&mut state.as_slice()).expect("the same");
-                Recorder::resume(f.path(), &fixture.scenario, options, view, state).map(|r| again = Some(r))
-            })
-            .expect("resumed");
-        let mut recorder = again.expect("a recorder");
-        fixture.go_on(&mut recorder, at, 1203).expect("ran");
-        recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
+        Fixture::new("iterative").recorded_twice(f.path(), options, at, 1203);
         for file in [RECORDING, VARIABLES, FINAL_GROUND, SUMMARY] {
             let read = |f: &Path| std::fs::read(f.join(file)).expect("written");
             assert!(read(whole.path()) == read(f.path()), "{file} differs after step {at}");
@@ -385,21 +363,10 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     assert!(places.is_sorted());
 }
 
-/// A run of single passes on a soil without a ledger.
-fn record_unknown(folder: &Path) -> Summary {
-    let mut fixture = Fixture::new("cooperative");
-    fixture.single_pass = true;
-    fixture.parts[2].1.silent = true;
-    let mut recorder =
-        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.run(&mut recorder, 100).expect("ran");
-    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
-}
-
 #[test]
 fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     let f = folder();
-    let s = record_unknown(f.path());
+    let s = Fixture::unknown().recorded(f.path(), RecorderOptions::default(), 100);
     assert_eq!(
         (s.gluing.max_gap_m, s.gluing.steps_not_converged, s.gluing.max_action_reaction_gap_n),
         (None, None, None)

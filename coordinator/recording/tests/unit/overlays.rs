@@ -17,13 +17,6 @@ fn fixture(overlays: bool) -> Fixture {
     fixture
 }
 
-fn run(folder: &Path, fixture: &mut Fixture, steps: u64) {
-    let mut recorder =
-        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.run(&mut recorder, steps).expect("ran");
-    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
-}
-
 /// Times (s) and messages of the topics of scenes.
 fn scenes(folder: &Path, topic: &str) -> Vec<(f64, SceneUpdate)> {
     let bytes = std::fs::read(folder.join(RECORDING)).expect("written");
@@ -48,7 +41,7 @@ fn topics(folder: &Path) -> Vec<String> {
 fn overlays_are_asked_for_only_where_the_scenario_wants_them() {
     let f = folder();
     let mut fixture = fixture(false);
-    run(f.path(), &mut fixture, 400);
+    fixture.recorded(f.path(), RecorderOptions::default(), 400);
     assert!(topics(f.path()).is_empty());
     assert!(fixture.parts.iter().all(|(_, part)| part.asked.get() == 0));
 }
@@ -57,7 +50,7 @@ fn overlays_are_asked_for_only_where_the_scenario_wants_them() {
 fn every_layer_is_a_topic_in_the_frames_of_its_figures() {
     let f = folder();
     let mut fixture = fixture(true);
-    run(f.path(), &mut fixture, 400);
+    fixture.recorded(f.path(), RecorderOptions::default(), 400);
     // fifty times a second, at the start and to 0.4 s
     assert!(fixture.parts.iter().all(|(_, part)| part.asked.get() == 21));
     let layers = ["gait/polygon", "gluing/residual", "robot/name", "robot/the_way"];
@@ -93,7 +86,7 @@ fn every_layer_is_a_topic_in_the_frames_of_its_figures() {
 #[test]
 fn a_shape_that_is_hidden_is_not_drawn_until_it_is_shown_again() {
     let f = folder();
-    run(f.path(), &mut fixture(false), 700);
+    fixture(false).recorded(f.path(), RecorderOptions::default(), 700);
     let all = scenes(f.path(), "/scene");
     let times: Vec<f64> = all.iter().map(|(t, _)| *t).collect();
     assert_eq!(all.len(), 3, "{times:?}");
@@ -110,29 +103,13 @@ fn a_shape_that_is_hidden_is_not_drawn_until_it_is_shown_again() {
 
 #[test]
 fn layers_and_hidden_shapes_go_on_from_a_checkpoint_to_the_same_bytes() {
-    use terraglue_subsystem::bytes::Persist;
     let whole = folder();
-    run(whole.path(), &mut fixture(true), 700);
+    fixture(true).recorded(whole.path(), RecorderOptions::default(), 700);
     let options = RecorderOptions { csv: false, checkpoints: true };
     // before and behind the layer that comes at 0.26 s, and between two records that meet a hidden shape
     for at in [199, 259, 261, 303, 401, 597] {
         let f = folder();
-        let mut fixture = fixture(true);
-        let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
-        fixture.start(&mut recorder).expect("started");
-        fixture.steps(&mut recorder, 0, at).expect("stepped");
-        let (mut state, mut again) = (Vec::new(), None);
-        fixture.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
-        drop(recorder);
-        fixture
-            .view(at, &mut |view| {
-                let state = RecorderState::read(&mut state.as_slice()).expect("the same");
-                Recorder::resume(f.path(), &fixture.scenario, options, view, state).map(|r| again = Some(r))
-            })
-            .expect("resumed");
-        let mut recorder = again.expect("a recorder");
-        fixture.go_on(&mut recorder, at, 700).expect("ran");
-        recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
+        fixture(true).recorded_twice(f.path(), options, at, 700);
         let read = |f: &Path| std::fs::read(f.join(RECORDING)).expect("written");
         assert!(read(whole.path()) == read(f.path()), "differs after step {at}");
     }

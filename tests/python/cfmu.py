@@ -32,9 +32,9 @@ int fmi2DoStep(Fmu *u, double t, double h, int p) { double *r = u->r; int *i = u
 """
 
 
-def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags=""):
+def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags="", depends=None):
     """The FMU `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
-    of its own, `flags` attributes of <CoSimulation>."""
+    of its own, `flags` attributes of <CoSimulation>; `depends` the places of what the outputs depend on, from 1; none: they depend on everything."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
     (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step, "more": more})
     command = ["cc", "-shared", "-fPIC", "-w", f"{name}.c", "-o", f"{name}.so", "-lm"]
@@ -46,7 +46,8 @@ def build(folder, name, reals, step, others="", units="", variable_step=True, ty
         unit = f' unit="{unit}"' if unit else ""
         text += f'<ScalarVariable name="{own}" valueReference="{k}" causality="{causality}"{tunable}>'
         text += f"<Real{value}{unit}/></ScalarVariable>"
-    outputs = "".join(f'<Unknown index="{k + 1}"/>' for k, v in enumerate(reals) if v[1] == "output")
+    known = "" if depends is None else f' dependencies="{depends}"'
+    outputs = "".join(f'<Unknown index="{k + 1}"{known}/>' for k, v in enumerate(reals) if v[1] == "output")
     units = f"<UnitDefinitions>{units}</UnitDefinitions>" if units else ""
     types = f"<TypeDefinitions>{types}</TypeDefinitions>" if types else ""
     variable = str(variable_step).lower()

@@ -5,9 +5,9 @@ import pytest
 from conftest import ROOT
 
 quickjs = pytest.importorskip("quickjs", reason="runs the script of the report's axes")
-SCRIPT = (ROOT / "coordinator/recording/src/assets/axes.js").read_text()
+SCRIPT = (ROOT / "coordinator/page/assets/axes.js").read_text()
 # the rest of the script needs a page
-PREFIXES = SCRIPT[SCRIPT.index("// Power to which"):SCRIPT.index("function short(")]
+PREFIXES = SCRIPT[SCRIPT.index("// Power to which"):SCRIPT.index("/** A number as short")].replace("export ", "")
 STEPS = {"M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9, "p": 1e-12, "f": 1e-15}
 
 

@@ -96,9 +96,10 @@ def test_an_event_is_met_exactly_too_unless_an_fmu_makes_steps_of_one_length_onl
     more = '[watch]\nfmu = "sink.fmu"\n[[connect]]\nfrom = "sink.free_seen"\nto = "watch.u"\n'
     exact = run(folder, tmp_path / "a", event, more)
     late = run(folder, tmp_path / "b", event, more, source="stiff")
-    # told at the start of each part: the new value is seen from 0.537 or 0.6 on, and counts from the next part on
-    assert exact["watch.sum"][-1] == pytest.approx(2 * (0.6 - 0.1) + 7 * (2.0 - 0.6), rel=1e-12)
-    assert late["watch.sum"][-1] == pytest.approx(2 * (0.7 - 0.1) + 7 * (2.0 - 0.7), rel=1e-12)
+    # `watch` is stepped after `sink`, with its output at the end of the part: no value is late, and the event holds from its time on,
+    # or from the next communication point
+    assert exact["watch.sum"][-1] == pytest.approx(2 * 0.537 + 7 * (2.0 - 0.537), rel=1e-12)
+    assert late["watch.sum"][-1] == pytest.approx(2 * 0.6 + 7 * (2.0 - 0.6), rel=1e-12)
 
 
 def test_a_condition_begins_a_fault_of_an_input_without_connection(folder, tmp_path):

@@ -12,7 +12,7 @@ import zlib
 import pytest
 from conftest import ROOT, terraglue
 
-ASSETS = ROOT / "coordinator/recording/src/assets"
+ASSETS = ROOT / "coordinator/page/assets"
 PHONE = 390  # px
 
 
@@ -75,7 +75,7 @@ def test_what_is_asked_first_stands_first(walk):
     first = ["Distance", "Energy per metre", "Energy balance", "Depth of the prints", "Peak force", "Real-time factor"]
     assert labels[:6] == first
     sections = re.findall(r'<section id="(\w+)">', page)
-    assert sections[0] == "figures" and sections[-1] == "exchange"
+    assert sections[:2] == ["run", "figures"] and sections[-1] == "exchange"
     assert re.search(r'<section id="exchange"><h2>[^<]*</h2>\s*<details><summary>', page), "the data flow is folded"
 
 
@@ -152,7 +152,7 @@ def test_the_pointer_tells_height_and_sinkage_of_a_node(walk):
     x = nodes["origin"][0] + nodes["spacing"] * (deepest % nx)
     y = nodes["origin"][1] + nodes["spacing"] * (deepest // nx)
     context = quickjs.Context()
-    context.eval((ASSETS / "ground.js").read_text())
+    context.eval((ASSETS / "nodes.js").read_text().replace("export ", ""))
     context.eval(f"const nodes = {json.dumps(nodes)};")
     text = context.eval(f"groundText(nodes, {x + 0.2 * nodes['spacing']}, {y})")
     millimetres = 1e3 * (nodes["sinkage"]["low"] + nodes["sinkage"]["step"] * sinkage[deepest])

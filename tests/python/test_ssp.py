@@ -296,3 +296,70 @@ def test_a_dictionary_or_table_that_is_wrong_is_refused(files, tmp_path, old, ne
         return
     flat = " ".join(done.stderr.replace("│", " ").split())
     assert done.returncode == 2 and all(word in flat for word in says), done.stderr
+
+
+MASS = [("f", "input", 0.0, ""), ("x", "output", 0.1, ""), ("k", "parameter", 1.0, "")]
+SPRING = [("x", "input", 100.0, "mm"), ("f", "output", -10.0, "")]
+TWO = """[time]
+step_s = 0.01
+duration_s = 0.5
+[recording]
+every_steps = 1
+[mass]
+fmu = "mass.fmu"
+k = 2
+[spring]
+fmu = "spring.fmu"
+[[connect]]
+from = "mass.x"
+to = "spring.x"
+factor = 1000.0
+convert = false
+[[connect]]
+from = "spring.f"
+to = "mass.f"
+"""
+
+
+def two(folder):
+    build(folder, "mass", MASS, "r[1] += r[2] * h * h * r[0];", units=UNITS, depends="")
+    build(folder, "spring", SPRING, "r[1] = -0.1 * r[0];", units=UNITS + '<Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit>', depends="1")
+    (folder / "two.toml").write_text(TWO)
+    return folder / "two.toml"
+
+
+def test_a_scenario_of_fmus_becomes_a_structure_that_runs_alike(tmp_path):
+    scenario = two(tmp_path)
+    done = terraglue("convert", scenario, "-o", tmp_path / "two.ssp")
+    assert done.returncode == 0 and "2 FMUs, 2 connections" in done.stdout and "0.01 s is left to the master" in done.stderr
+    numbers = {}
+    for name in ("two.toml", "two.ssp"):
+        out = tmp_path / f"out_{name}"
+        done = terraglue("run", tmp_path / name, "--set", "time.step_s=0.01", "--csv", "--quiet", "--out", out)
+        assert done.returncode == 0, done.stderr
+        numbers[name] = (out / "variables.csv").read_text()
+    assert numbers["two.toml"] == numbers["two.ssp"] and len(numbers["two.ssp"].splitlines()) == 52
+
+
+def test_another_program_reads_the_structure(tmp_path):
+    from fmpy.ssp.ssd import read_ssd
+
+    assert terraglue("convert", two(tmp_path), "-o", tmp_path / "two.ssp").returncode == 0
+    structure = read_ssd(tmp_path / "two.ssp")
+    assert {e.name for e in structure.system.elements} == {"mass", "spring"} and len(structure.system.connections) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('fmu = "spring.fmu"', 'module = "gait"', ["`spring` is a module", "terraglue export"]),
+        ('from = "spring.f"', 'from = "spring.*"', ["two.toml:17", "no variable", "no pattern"]),
+        ("k = 2", '[[event]]\nat_s = 0.1\nset = { "mass.k" = 1.0 }\n[mass.start]\nk = 2', ["`[[event]]`", "no such thing"]),
+    ],
+)
+def test_what_a_structure_cannot_say_is_refused(tmp_path, old, new, words):
+    scenario = two(tmp_path)
+    scenario.write_text(TWO.replace(old, new))
+    done = terraglue("convert", scenario, "-o", tmp_path / "two.ssp")
+    assert done.returncode == 2 and all(word in done.stderr for word in words), done.stderr
+    assert not (tmp_path / "two.ssp").exists()

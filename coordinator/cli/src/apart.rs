@@ -1,13 +1,22 @@
 //! `terraglue fmu run --isolate`: the same command in a process of its own.
+//!
+//! Its rows come through a pipe of their own, which stands where its standard input was; all else that it writes goes to standard
+//! error, within bounds. It notes the time of each row in a file, so the process that waits knows how far it has come and whether it
+//! goes on.
 
 use super::Exit;
 use super::arguments::FmuRunArguments;
 use super::interrupt::Interrupt;
 use rustix::process::{Signal, set_parent_process_death_signal};
+use std::fs::File;
+use std::io::{PipeReader, PipeWriter, Read, Write};
+use std::os::unix::fs::FileExt;
 use std::os::unix::process::CommandExt;
-use std::path::Path;
-use std::process::Command;
-use std::sync::atomic::Ordering;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::Folder;
@@ -39,16 +48,83 @@ pub fn done(code: u8) {
     }
 }
 
+/// Bytes of what a process writes beside its rows that are shown, of each of its two outputs.
+const MOST_OUTPUT: usize = 1 << 20;
+
 /// File with the time of the last row.
 const REACHED: &str = "reached";
 
-/// Tells the process that waits for this one how far it has come: the row that is written now.
-pub fn reached(row: &str) {
-    let time = row.split(',').next().filter(|t| t.parse::<f64>().is_ok());
-    if let (Some(path), Some(time)) = (std::env::var_os(DONE), time) {
-        // It is missed only where the process is lost.
-        drop(std::fs::write(Path::new(&path).with_file_name(REACHED), time));
+/// What a process writes to the one that waits for it. It owns no descriptor: an FMU may close what is not its own.
+pub struct Report {
+    reached: PathBuf,
+    /// Rows so far: a change says that it goes on.
+    count: u64,
+}
+
+impl Report {
+    /// Of this process, where another one waits for it.
+    pub fn of_child() -> Option<Self> {
+        let reached = Path::new(&std::env::var_os(DONE)?).with_file_name(REACHED);
+        Some(Self { reached, count: 0 })
     }
+
+    /// Writes a row, to the table of the command or not, and how far it has come.
+    ///
+    /// # Errors
+    /// Nobody reads any more.
+    pub fn row(&mut self, text: &str, shows: bool) -> std::io::Result<()> {
+        if shows {
+            let line = format!("{text}\n");
+            let mut rest = line.as_bytes();
+            while !rest.is_empty() {
+                let written = rustix::io::write(std::io::stdin(), rest)?;
+                rest = &rest[written..];
+            }
+        }
+        self.count += 1;
+        let time = text.split(',').next().filter(|t| t.parse::<f64>().is_ok()).unwrap_or_default();
+        let file = File::options().write(true).create(true).truncate(false).open(&self.reached)?;
+        file.write_all_at(format!("{time:<40}{:<20}", self.count).as_bytes(), 0)
+    }
+}
+
+/// Sends on what a process writes, to standard error, up to a bound.
+fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
+    std::thread::spawn(move || {
+        let mut left = MOST_OUTPUT;
+        let mut bytes = [0; 8192];
+        // a process that is gone has no more to say
+        while let Ok(count @ 1..) = from.read(&mut bytes) {
+            let shown = count.min(left);
+            drop(std::io::stderr().write_all(&bytes[..shown]));
+            if shown < count && left > 0 {
+                eprintln!("\nwarning: the FMU has written {} kB; the rest is left out", MOST_OUTPUT >> 10);
+            }
+            left -= shown;
+        }
+    })
+}
+
+/// Sends rows on to standard output; says when nobody reads them any more, as after `head`.
+fn send_rows(mut from: PipeReader, unread: Arc<AtomicBool>) -> JoinHandle<()> {
+    std::thread::spawn(move || {
+        let mut out = std::io::stdout().lock();
+        let sent = std::io::copy(&mut from, &mut out).and_then(|_| out.flush());
+        unread.store(sent.is_err(), Ordering::Relaxed);
+    })
+}
+
+/// The command again without `--isolate`, with a folder of its own and a pipe for its rows.
+fn started(folder: &Path, rows: PipeWriter) -> std::io::Result<Child> {
+    Command::new(std::env::current_exe()?)
+        .args(std::env::args_os().skip(1).filter(|word| word != "--isolate"))
+        .env("TMPDIR", folder)
+        .env(DONE, folder.join(DONE))
+        .stdin(rows)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .spawn()
 }
 
 /// Runs the command again without `--isolate` and says how it ended.
@@ -59,16 +135,12 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     interrupt.run();
     let stopped = interrupt.flag();
     let folder = Folder::new("worker").map_err(|e| failed(&e))?;
-    let own = std::env::current_exe().map_err(|e| failed(&e))?;
-    let words = std::env::args_os().skip(1).filter(|word| word != "--isolate");
-    let mut child = Command::new(own)
-        .args(words)
-        .env("TMPDIR", folder.path())
-        .env(DONE, folder.path().join(DONE))
-        .process_group(0)
-        .spawn()
-        .map_err(|e| failed(&e))?;
-    let end = Instant::now() + Duration::from_secs_f64(arguments.timeout.min(1e7));
+    let (rows, theirs) = std::io::pipe().map_err(|e| failed(&e))?;
+    let mut child = started(folder.path(), theirs).map_err(|e| failed(&e))?;
+    let unread = Arc::<AtomicBool>::default();
+    let rows = send_rows(rows, Arc::clone(&unread));
+    let outputs = [child.stdout.take().map(send_on), child.stderr.take().map(send_on)];
+    let mut row_wait = RowWait::new(folder.path().join(REACHED), arguments.timeout);
     let status = loop {
         match child.try_wait().map_err(|e| failed(&e))? {
             Some(status) => break Some(status),
@@ -77,21 +149,32 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
                 drop(child.wait());
                 return Ok(Exit::Interrupted);
             }
-            None if Instant::now() >= end => break None,
+            None if unread.load(Ordering::Relaxed) => {
+                end_group(child.id());
+                drop(child.wait());
+                return Ok(Exit::Done);
+            }
+            None if row_wait.is_over() => break None,
             None => std::thread::sleep(LOOK),
         }
     };
     end_group(child.id());
     drop(child.wait());
+    drop(rows.join());
+    outputs.into_iter().flatten().for_each(|output| drop(output.join()));
     let lost = |why: &str| {
-        let reached = std::fs::read_to_string(folder.path().join(REACHED));
-        let reached = reached.ok().filter(|t| !t.is_empty());
+        let reached = std::fs::read_to_string(folder.path().join(REACHED)).unwrap_or_default();
+        let reached = reached.get(..40).map(|t| t.trim().to_owned()).filter(|t| !t.is_empty());
         let when = reached.map_or_else(|| "before its first row".to_owned(), |t| format!("after t = {t} s"));
         eprintln!("error: {}: its process was lost {when}: {why}", arguments.fmu.display());
         Exit::Failed
     };
     let Some(status) = status else {
-        return Ok(lost(&format!("it did not end within {} s (--timeout) and was ended", arguments.timeout)));
+        let why = format!(
+            "no row came within {} s (--timeout S lets it wait longer) and it was ended",
+            arguments.timeout
+        );
+        return Ok(lost(&why));
     };
     // How it ended is believed where the command itself says so: its errors are told then.
     let said = std::fs::read_to_string(folder.path().join(DONE)).ok().and_then(|t| t.parse().ok());
@@ -102,4 +185,34 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         Some(130) => Exit::Interrupted,
         _ => lost(&last_words(status)),
     })
+}
+
+/// How long the next row is waited for.
+struct RowWait {
+    path: PathBuf,
+    limit: Duration,
+    seen: Vec<u8>,
+    since: Instant,
+    looked: Instant,
+}
+
+impl RowWait {
+    fn new(path: PathBuf, limit_s: f64) -> Self {
+        let now = Instant::now();
+        let limit = Duration::from_secs_f64(limit_s.min(1e7));
+        Self { path, limit, seen: Vec::new(), since: now, looked: now }
+    }
+
+    /// Whether no row has come for too long.
+    fn is_over(&mut self) -> bool {
+        if self.looked.elapsed() < self.limit.min(Duration::from_millis(100)) {
+            return false;
+        }
+        self.looked = Instant::now();
+        let now = std::fs::read(&self.path).unwrap_or_default();
+        if now != self.seen {
+            (self.seen, self.since) = (now, self.looked);
+        }
+        self.since.elapsed() >= self.limit
+    }
 }

@@ -1,5 +1,10 @@
 //! The arguments and their help.
 
+use crate::locate::arguments::LocateArguments;
+use crate::scenario_arguments::{ScenarioArguments, parse_folder, parse_set};
+use crate::serve_arguments::ServeArguments;
+use crate::shot_arguments::ShotArguments;
+use crate::video_arguments::VideoArguments;
 use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -38,6 +43,13 @@ pub enum Command {
         #[arg(value_name = "DIR")]
         folder: PathBuf,
     },
+    /// Show a run on a page while it goes on: look, change it, go back in it; or replay a recording. Viewers of the Foxglove
+    /// WebSocket protocol connect to the same address.
+    Serve(ServeArguments),
+    /// Take a picture of a run at a time, in a browser that is found on this machine.
+    Shot(ShotArguments),
+    /// Make a video of a run, picture by picture in simulated time, with a browser that is found on this machine.
+    Video(VideoArguments),
     /// Check a scenario and everything that it refers to, without a step of it; modules and FMUs are made.
     Check(CheckArguments),
     /// Put a module to the test: named tests of what it promises, each in a process of its own.
@@ -77,6 +89,8 @@ pub enum Command {
     New(NewArguments),
     /// Find the parameters of a soil from plate tests.
     FitSoil(FitSoilArguments),
+    /// Find where a laser scanner stands among the trees of a map; that it is ambiguous or lost is an answer, too.
+    Locate(LocateArguments),
     /// Show a robot file as it would be simulated: bodies, joints, mass, inertia, warnings.
     Robot(RobotArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
@@ -91,19 +105,6 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
-}
-
-/// A scenario with its edits.
-#[derive(Args, Debug, Clone)]
-pub struct ScenarioArguments {
-    /// Scenario file (TOML).
-    pub scenario: PathBuf,
-    /// Edit the scenario before it is checked; a bare word is text. May be repeated.
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = parse_set)]
-    pub sets: Vec<(String, String)>,
-    /// Search this folder for modules first; may be repeated.
-    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
-    pub module_path: Vec<PathBuf>,
 }
 
 /// What `variables` takes.
@@ -176,6 +177,9 @@ pub struct RunCommand {
     /// Go no faster than the clock; results do not depend on it.
     #[arg(long)]
     pub realtime: bool,
+    /// Show the run on a page while it goes on, as `terraglue serve` does; the address is printed.
+    #[arg(long, conflicts_with_all = ["resume", "checkpoint_every", "watch", "csv", "explain", "no_report"])]
+    pub serve: bool,
     /// Write recording and summary only; `terraglue report DIR` makes the report later.
     #[arg(long)]
     pub no_report: bool,
@@ -221,12 +225,12 @@ fn simulated_time(text: &str) -> Result<f64, String> {
 /// What `convert` takes.
 #[derive(Args, Debug, Clone)]
 pub struct ConvertArguments {
-    /// The structure.
-    #[arg(value_name = "SYSTEM.ssp|.ssd")]
+    /// The structure, or a scenario of FMUs.
+    #[arg(value_name = "SYSTEM.ssp|.ssd|SCENARIO.toml")]
     pub structure: PathBuf,
     /// The scenario to write [default: the structure's name with .toml, beside it]; the FMUs of an archive go into a
-    /// folder of the same name.
-    #[arg(short, long, value_name = "FILE.toml")]
+    /// folder of the same name. Of a scenario: the archive to write.
+    #[arg(short, long, value_name = "FILE.toml|.ssp")]
     pub output: Option<PathBuf>,
 }
 
@@ -249,6 +253,19 @@ pub struct ExportArguments {
     /// Edit the scenario before it is exported; a bare word is text. May be repeated.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = parse_set)]
     pub sets: Vec<(String, String)>,
+    /// Author in the description.
+    #[arg(long, value_name = "TEXT")]
+    pub author: Option<String>,
+    /// Version of the model in the description.
+    #[arg(long, value_name = "TEXT")]
+    pub model_version: Option<String>,
+    /// Date and time in the description, as in 2026-11-27T12:00:00Z [default: SOURCE_DATE_EPOCH, else none, so that the same input
+    /// gives the same bytes].
+    #[arg(long, value_name = "TIME", value_parser = super::words::parse_time)]
+    pub date: Option<String>,
+    /// Leave out the results of its first steps, which `fmu check --run` compares with.
+    #[arg(long)]
+    pub no_reference: bool,
     /// Search this folder for modules first; may be repeated.
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub module_path: Vec<PathBuf>,
@@ -521,25 +538,12 @@ fn process_count(text: &str) -> Result<std::num::NonZeroUsize, String> {
     number.ok_or_else(|| format!("a whole number from 1 to {MOST_THREADS} is wanted"))
 }
 
-fn parse_set(text: &str) -> Result<(String, String), String> {
-    terraglue_scenario::split_set(text).ok_or_else(|| "there is no `=`: write KEY.PATH=VALUE".into())
-}
-
 fn parse_package(text: &str) -> Result<(String, String), String> {
     let (name, folder) =
         terraglue_scenario::split_set(text).ok_or_else(|| "there is no `=`: write NAME=DIR".to_owned())?;
     match std::path::Path::new(&folder).is_dir() {
         true => Ok((name, folder)),
         false => Err(format!("there is no folder `{folder}`: name the folder of the package `{name}`")),
-    }
-}
-
-/// A folder that is there; one with a wrong name would hold no modules without a word.
-fn parse_folder(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.is_dir() {
-        true => Ok(path),
-        false => Err(format!("there is no folder `{text}`; modules are looked for in folders")),
     }
 }
 
@@ -575,15 +579,24 @@ fn parse_vary(text: &str) -> Result<(String, Vec<String>), String> {
 pub enum FmuCommand {
     /// Run an FMU alone and write its outputs as a table.
     Run(FmuRunArguments),
-    /// Show what is inside an FMU; none of its code runs.
+    /// Show what is inside an FMU of any version; none of its code runs.
     Info {
         /// The FMU.
         fmu: PathBuf,
+        /// Print JSON instead of tables.
+        #[arg(long)]
+        json: bool,
     },
-    /// List what is wrong with an FMU; none of its code runs.
+    /// List what is wrong with an FMU; none of its code runs without --run.
     Check {
         /// The FMU.
         fmu: PathBuf,
+        /// Also run the default experiment, and hold it against the results that the FMU brings with it (FMI-LS-REF).
+        #[arg(long)]
+        run: bool,
+        /// Largest difference from these results that passes, as a share of the range of each output.
+        #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = positive, requires = "run")]
+        within: f64,
     },
 }
 
@@ -617,17 +630,26 @@ pub struct FmuRunArguments {
     /// Communication step, s [default: what the FMU wants, else a 500th of the run].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Relative tolerance.
+    /// Relative tolerance [default: what the FMU wants].
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
+    /// Switch categories of its own log on, separated by commas; `all` for all of them. `fmu info` lists them.
+    #[arg(long, value_delimiter = ',', value_name = "CATEGORIES")]
+    pub log_categories: Vec<String>,
+    /// Refuse an FMU whose description contradicts the standard, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// Write every call of the FMU here before it is made, with its values by reference and its status.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Names to write, separated by commas [default: all outputs].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub output: Vec<String>,
     /// Run it in a process of its own: a crash, a hang or an `exit` is an error.
     #[arg(long)]
     pub isolate: bool,
-    /// Longest time of the whole run where it is isolated, s.
-    #[arg(long, value_name = "S", default_value_t = 3600.0, value_parser = positive, allow_negative_numbers = true)]
+    /// Longest time from one row to the next where it is isolated, s.
+    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = positive, allow_negative_numbers = true)]
     pub timeout: f64,
     /// Most memory where it is isolated, MiB.
     #[arg(long, value_name = "MIB", default_value_t = 8192)]

@@ -2,7 +2,7 @@
 
 use super::arguments::CheckArguments;
 use super::output::outln;
-use super::run::build;
+use super::testbed::build;
 use super::{Exit, show, soil_module, strict};
 use terraglue_diagnostics::Result;
 use terraglue_engine::testbed::Options;

@@ -7,7 +7,7 @@ use super::folder::results_folder;
 use super::interrupt::Interrupt;
 use super::output::outln;
 use super::progress::{self, Progress, Waiting};
-use super::{Exit, logger, run, show};
+use super::{Exit, logger, run, show, testbed};
 use indicatif::ProgressBar;
 use plan::Plan;
 use std::path::{Path, PathBuf};
@@ -211,8 +211,8 @@ fn recorded(
     cancel: &Arc<AtomicBool>,
     bar: &ProgressBar,
 ) -> Result<run::Outcome> {
-    let options = run::options(arguments, cancel);
-    let testbed = run::build(&plan.scenario, &options)?;
+    let options = testbed::options(arguments, cancel);
+    let testbed = testbed::build(&plan.scenario, &options)?;
     let label = format!("{}: ", plan.name);
     let waiting = Waiting::standing(arguments.quiet, bar, options.standing, &label);
     let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label).after(waiting);
@@ -241,7 +241,7 @@ fn cold_start_mean(
 ) -> Option<f64> {
     let mut scenario = plan.scenario.clone();
     scenario.gluing.start = terraglue_scenario::StartChoice::Zero;
-    let mut testbed = run::build(&scenario, &run::options(arguments, cancel)).ok()?;
+    let mut testbed = super::testbed::build(&scenario, &testbed::options(arguments, cancel)).ok()?;
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "without the estimate: ");
     let mut figures = SummaryObserver::new(&scenario);
     testbed.begin().ok()?;

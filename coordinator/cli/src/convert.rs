@@ -1,8 +1,9 @@
-//! `terraglue convert`: a system structure (SSP) as a scenario.
+//! `terraglue convert`: a system structure (SSP) as a scenario, or a scenario as a system structure.
 
 use super::Exit;
 use super::arguments::ConvertArguments;
 use super::output::outln;
+use super::structure;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::ssp::Package;
@@ -12,11 +13,16 @@ use terraglue_scenario::{InputError, Scenario};
 /// Writes the scenario, and the FMUs of an archive beside it.
 pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
     let path = &arguments.structure;
+    if let (Some(to), false) =
+        (arguments.output.as_deref().filter(|to| Package::is_one(to)), Package::is_one(path))
+    {
+        return structure::write(path, to);
+    }
     let out = arguments.output.clone().unwrap_or_else(|| path.with_extension("toml"));
     if !Package::is_one(path) {
         let message = format!("`{}` is no system structure (.ssp, .ssd)", path.display());
         let help =
-            "an archive ends in .ssp, a single description in .ssd; scenarios are run as they are".to_owned();
+            "an archive ends in .ssp, a single description in .ssd; a scenario of FMUs becomes one with `-o system.ssp`".to_owned();
         return Err(InputError::plain(message, Some(help)).into());
     }
     let wrong = |e: terraglue_fmi::Error| InputError::plain(e.to_string(), None);

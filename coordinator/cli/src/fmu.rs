@@ -1,17 +1,19 @@
 //! `terraglue fmu run | info | check`: one functional mock-up unit.
 
 use super::arguments::{FmuCommand, FmuRunArguments};
+use super::fmu_info::info;
 use super::interrupt::Interrupt;
-use super::output::outln;
+use super::output::{end_if_unread, outln};
 use super::table_file::{self, TableFile};
-use super::{Exit, apart, show};
-use std::fmt::Debug;
+use super::{Exit, apart};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::description::ModelDescription;
+use terraglue_fmi::instance::Trace;
 use terraglue_fmi::{Error as FmiError, Fmu};
-use terraglue_fmu::simulate::{self, InputRow, Settings, Table, Tables};
+use terraglue_fmu::simulate::{self, Settings, Table, Tables};
+use terraglue_fmu::{references, trace};
 use terraglue_host::isolation::confine;
 use terraglue_scenario::InputError;
 
@@ -20,8 +22,8 @@ pub fn fmu(command: &FmuCommand) -> Result<Exit> {
     match command {
         FmuCommand::Run(arguments) if arguments.isolate => apart::run(arguments),
         FmuCommand::Run(arguments) => run(arguments),
-        FmuCommand::Info { fmu } => info(fmu),
-        FmuCommand::Check { fmu } => check(fmu),
+        FmuCommand::Info { fmu, json } => info(fmu, *json, input),
+        FmuCommand::Check { fmu, run, within } => check(fmu, run.then_some(*within)),
     }
 }
 
@@ -41,10 +43,12 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         confine(arguments.memory_mb.saturating_mul(1 << 20));
     }
     let fmu = Fmu::open(&arguments.fmu).map_err(input)?;
-    for problem in &fmu.description().problems {
-        log::warn!(target: "terraglue_fmu", "{problem}");
-    }
     let settings = settings(arguments)?;
+    if !settings.strict {
+        for warning in fmu.description().warnings() {
+            log::warn!(target: "terraglue_fmu", "{warning}");
+        }
+    }
     if let Err(error) = simulate::check(&fmu, &settings, arguments.intermediate.is_some()) {
         return Ok(failed(&arguments.fmu, &error));
     }
@@ -53,42 +57,47 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let between = arguments.intermediate.as_deref().map(TableFile::create).transpose()?;
     let tables: Vec<TableFile> = [&file, &between].into_iter().flatten().cloned().collect();
     let _exit_hook = table_file::exit_hook(&arguments.fmu, tables.clone());
-    let sink = Box::new(|line: &terraglue_fmi::LogLine| {
-        log::log!(target: "terraglue_fmu", level(line), "{}", line.text);
-    });
-    let child = apart::is_child();
+    let mut report = apart::Report::of_child();
     let mut row = |text: &str| {
         if stopped.load(Ordering::Relaxed) {
             return Err(FmiError::Refused("stopped".into()));
         }
-        match &file {
-            None => outln!("{text}"),
-            Some(file) => line(file, text)?,
+        match (&file, &report) {
+            (Some(file), _) => line(file, text)?,
+            (None, None) => outln!("{text}"),
+            (None, Some(_)) => {}
         }
-        if child {
-            apart::reached(text);
-        }
-        Ok(())
+        let told = report.as_mut().map_or(Ok(()), |report| report.row(text, file.is_none()));
+        told.inspect_err(end_if_unread).map_err(|e| FmiError::Refused(format!("the table: {e}")))
     };
     let mut row_between = between.as_ref().map(|file| |text: &str| line(file, text));
     let intermediate = row_between.as_mut().map(|row| row as simulate::Line);
-    let ran = simulate::run(&fmu, &settings, sink, &mut Tables { rows: &mut row, intermediate });
+    let ran = simulate::run(
+        &fmu,
+        &settings,
+        Box::new(tell),
+        &mut Tables { rows: &mut row, intermediate, keep: &|| keep(&tables) },
+    );
     for table in &tables {
         table.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
     }
     match ran {
         Ok(ended) => {
-            if let Some(t) = ended {
+            ended.iter().for_each(|t| {
                 eprintln!(
                     "note: {}: the FMU asked for the end of the run at t = {t} s",
                     arguments.fmu.display()
                 );
-            }
+            });
             Ok(Exit::Done)
         }
         Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
         Err(error) => Ok(failed(&arguments.fmu, &error)),
     }
+}
+
+fn traced(path: &Path) -> Result<Trace> {
+    trace::to_file(path).map_err(|source| Error::File { path: path.display().to_string(), source })
 }
 
 /// What the options say of a run.
@@ -101,8 +110,17 @@ fn settings(arguments: &FmuRunArguments) -> Result<Settings> {
         tolerance: arguments.tolerance,
         outputs: arguments.output.clone(),
         event_mode: arguments.event_mode,
-        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
+        input: arguments
+            .input
+            .as_deref()
+            .map(|path| Table::read(path, false).map_err(input))
+            .transpose()?
+            .unwrap_or_default()
+            .into(),
         hold_inputs: arguments.hold_inputs,
+        log_categories: arguments.log_categories.clone(),
+        strict: arguments.strict,
+        trace: arguments.trace.as_deref().map(traced).transpose()?,
     })
 }
 
@@ -123,8 +141,20 @@ fn failed(fmu: &Path, error: &FmiError) -> Exit {
     exit
 }
 
+/// What was written so far is on disk: code of the FMU that could crash comes next.
+fn keep(tables: &[TableFile]) -> terraglue_fmi::Result {
+    tables
+        .iter()
+        .try_for_each(|table| table.flush().map_err(|e| FmiError::Refused(format!("the table: {e}"))))
+}
+
 fn line(file: &TableFile, text: &str) -> terraglue_fmi::Result {
     file.line(text).map_err(|e| FmiError::Refused(format!("the table: {e}")))
+}
+
+/// Hands a line of the FMU's log on.
+fn tell(line: &terraglue_fmi::LogLine) {
+    log::log!(target: "terraglue_fmu", level(line), "{}", line.text);
 }
 
 fn level(line: &terraglue_fmi::LogLine) -> log::Level {
@@ -137,76 +167,8 @@ fn level(line: &terraglue_fmi::LogLine) -> log::Level {
     }
 }
 
-fn table(path: &Path) -> Result<Table> {
-    let wrong = |e: &dyn std::fmt::Display| input(format!("{}: {e}", path.display()));
-    let file = terraglue_subsystem::files::open(path).map_err(|e| wrong(&e))?;
-    let mut reader = csv::Reader::from_reader(file);
-    let header = reader.headers().map_err(|e| wrong(&e))?.clone();
-    if header.get(0) != Some("time") {
-        return Err(wrong(&"the first column is not `time`"));
-    }
-    let mut rows: Vec<InputRow> = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| wrong(&e))?;
-        let line = rows.len() + 2;
-        let mut cells = record.iter().map(|t| t.trim().to_owned());
-        let time = cells.next().and_then(|t| t.parse().ok()).filter(|t: &f64| t.is_finite());
-        let time = time.ok_or_else(|| wrong(&format!("line {line}: the time is no number")))?;
-        if rows.last().is_some_and(|before| before.time >= time) {
-            return Err(wrong(&format!("line {line}: the time does not grow")));
-        }
-        let cells: Vec<String> = cells.collect();
-        let numbers = cells.iter().map(|t| t.parse().unwrap_or(f64::NAN)).collect();
-        rows.push(InputRow { time, cells, numbers });
-    }
-    Ok(Table { names: header.iter().skip(1).map(str::to_owned).collect(), rows })
-}
-
-fn info(fmu: &Path) -> Result<Exit> {
-    let (d, entries) = Fmu::inspect(fmu).map_err(input)?;
-    let platforms = terraglue_fmi::platforms(entries.iter().map(String::as_str));
-    outln!("{}: `{}`, {}", fmu.display(), d.model_name, words(&d.version));
-    let facts = [("made by", &d.generation_tool), ("about", &d.description), ("author", &d.author)];
-    for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
-        outln!("{name}: {text}");
-    }
-    outln!("platforms: {}", if platforms.is_empty() { "none".into() } else { platforms.join(", ") });
-    outln!("experiment: {}", words(&d.experiment));
-    outln!("capabilities: {}", words(&d.capabilities));
-    let mut table =
-        show::table(&["variable", "reference", "type", "causality", "variability", "unit", "start"]);
-    for v in &d.variables {
-        let kind = if v.sizes.is_empty() {
-            words(&v.value_type)
-        } else {
-            format!("{:?}{:?}", v.value_type, v.sizes)
-        };
-        let unit = v.unit.clone().unwrap_or_default();
-        let start = words(&v.start);
-        let reference = v.reference.to_string();
-        table.add_row([
-            &v.name,
-            &reference,
-            &kind,
-            &words(&v.causality),
-            &words(&v.variability),
-            &unit,
-            &start,
-        ]);
-    }
-    outln!("{table}");
-    for t in &d.terminals {
-        let members: Vec<&str> = t.members.iter().map(|(_, k)| d.variables[*k].name.as_str()).collect();
-        outln!("terminal `{}` ({}): {}", t.name, t.kind, members.join(", "));
-    }
-    Ok(Exit::Done)
-}
-
-fn words(value: &impl Debug) -> String {
-    format!("{value:?}")
-}
-
-fn check(fmu: &Path) -> Result<Exit> {
+/// Lists what is wrong with an FMU; with a share also how far it is from the results that it brings with it, and whether that is more.
+fn check(fmu: &Path, within: Option<f64>) -> Result<Exit> {
     let (d, entries) = Fmu::inspect(fmu).map_err(input)?;
     let problems = problems(&d, &entries);
     for problem in &problems {
@@ -215,9 +177,37 @@ fn check(fmu: &Path) -> Result<Exit> {
     let name = fmu.display();
     if problems.is_empty() {
         outln!("{name}: no problem found");
-        return Ok(Exit::Done);
     }
-    Ok(Exit::Failed)
+    let exit = if problems.is_empty() { Exit::Done } else { Exit::Failed };
+    let Some(within) = within else { return Ok(exit) };
+    let opened = Fmu::open(fmu).map_err(input)?;
+    let runs = match references::rerun(&opened, || Box::new(tell)) {
+        Ok(runs) if runs.is_empty() => {
+            let text = format!("{name}: it holds no results of its default experiment (FMI-LS-REF)");
+            return Err(input(text));
+        }
+        Ok(runs) => runs,
+        Err(error) => return Ok(failed(fmu, &error)),
+    };
+    let mut off = false;
+    for run in &runs {
+        outln!("{}: {} rows", run.file, run.rows);
+        outln!("{}", deviations(run, within));
+        off |= run.deviations.iter().any(|d| !(d.share <= within));
+    }
+    Ok(if off { Exit::Failed } else { exit })
+}
+
+fn deviations(run: &references::Rerun, within: f64) -> comfy_table::Table {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(comfy_table::presets::ASCII_MARKDOWN);
+    table.set_header(["output", "largest difference", "at t, s", "of its range", ""]);
+    for d in &run.deviations {
+        let verdict = if d.share <= within { "" } else { "off" };
+        let cells = [d.name.clone(), format!("{:.3e}", d.largest), d.at_s.to_string()];
+        table.add_row(cells.into_iter().chain([format!("{:.3e}", d.share), verdict.to_owned()]));
+    }
+    table
 }
 
 fn problems(d: &ModelDescription, entries: &[String]) -> Vec<String> {
@@ -227,20 +217,6 @@ fn problems(d: &ModelDescription, entries: &[String]) -> Vec<String> {
         let found = terraglue_fmi::platforms(entries.iter().map(String::as_str));
         all.push(format!("there is no library `{library}`; platforms: {}", found.join(", ")));
     }
-    for v in &d.variables {
-        if v.has_start()
-            && v.start == terraglue_fmi::description::Start::None
-            && !v.alias
-            && v.value_type != terraglue_subsystem::ValueType::Clock
-        {
-            all.push(format!("line {}: `{}` needs a start value", v.line, v.name));
-        }
-        if let Some(unit) = v.unit.as_ref().filter(|u| !d.units.iter().any(|(n, _)| n == *u)) {
-            all.push(format!(
-                "line {}: `{}` has the unit `{unit}`, whose base units are not given",
-                v.line, v.name
-            ));
-        }
-    }
+    all.extend(d.defects().iter().map(ToString::to_string));
     all
 }

@@ -105,7 +105,8 @@ mod tests {
     #[test]
     fn a_folder_that_a_run_writes_into_is_refused() {
         let temporary = tempfile::tempdir().expect("folder");
-        let running = terraglue_recording::KeptFile::create(&temporary.path().join(RECORDING)).expect("file");
+        let running =
+            terraglue_host::kept_file::KeptFile::create(&temporary.path().join(RECORDING)).expect("file");
         let error = results_folder(Some(temporary.path()), "walk").expect_err("refused");
         assert!(error.to_string().contains("another run"), "{error}");
         drop(running);

@@ -4,6 +4,7 @@
 
 mod apart;
 mod arguments;
+mod browser;
 mod check;
 mod check_module;
 mod compare;
@@ -13,24 +14,35 @@ mod fit_files;
 mod fit_soil;
 mod fit_wheel;
 mod fmu;
+mod fmu_info;
 mod folder;
 mod interrupt;
 mod list;
+mod locate;
 mod logger;
 mod new;
 mod output;
 mod pace;
 mod progress;
-mod recorder;
 mod report;
 mod robot;
 mod run;
+mod scenario_arguments;
+mod serve;
+mod serve_arguments;
 mod shorten;
+mod shot;
+mod shot_arguments;
 mod show;
 mod soil_module;
 mod soils;
 mod strict;
+mod structure;
 mod table_file;
+mod testbed;
+mod video;
+mod video_arguments;
+mod webm;
 mod words;
 
 use arguments::{Arguments, Command};
@@ -93,6 +105,9 @@ fn command(command: Command) -> Exit {
         Command::Run(arguments) => run::run(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Report { folder } => report::report(&folder),
+        Command::Serve(arguments) => serve::serve(&arguments),
+        Command::Shot(arguments) => shot::shot(&arguments),
+        Command::Video(arguments) => video::video(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::CheckModule(arguments) => check_module::check_module(&arguments),
         Command::Modules { name, module_path, json, asked } => {
@@ -106,6 +121,7 @@ fn command(command: Command) -> Exit {
         Command::New(arguments) => new::new(&arguments),
         Command::Robot(arguments) => robot::robot(&arguments),
         Command::Soils { name, file, json } => soils::soils(name.as_deref(), file.as_deref(), json),
+        Command::Locate(arguments) => locate::locate(&arguments),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
     };
     done.unwrap_or_else(|error| {

@@ -2,7 +2,7 @@
 
 use super::arguments::VariablesArguments;
 use super::output::outln;
-use super::run::build;
+use super::testbed::build;
 use super::{Exit, show};
 use std::path::{Path, PathBuf};
 use terraglue_conformance::{LastCheck, last_check};

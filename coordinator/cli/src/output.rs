@@ -10,14 +10,19 @@ use terraglue_host::exit_guard;
 pub fn line(text: Arguments) {
     let mut out = std::io::stdout().lock();
     if let Err(error) = write_line(&mut out, text) {
-        if error.kind() == ErrorKind::BrokenPipe {
-            apart::done(0);
-            exit_guard::leave(0);
-        }
+        end_if_unread(&error);
         eprintln!(
             "error: standard output: {error}\n  help: look for room where it is written to, or send it elsewhere"
         );
         exit_guard::leave(1);
+    }
+}
+
+/// Ends the program with code 0 where a write failed because nobody reads on.
+pub fn end_if_unread(error: &std::io::Error) {
+    if error.kind() == ErrorKind::BrokenPipe {
+        apart::done(0);
+        exit_guard::leave(0);
     }
 }
 

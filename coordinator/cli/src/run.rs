@@ -6,11 +6,9 @@ use super::interrupt::Interrupt;
 use super::output::outln;
 use super::pace::Pace;
 use super::progress::{self, Progress, Waiting};
-use super::recorder::SharedRecorder;
-use super::{Exit, exit_of, show, soil_module, strict};
+use super::testbed::{build, options, set_back};
+use super::{Exit, exit_of, serve, show, soil_module, strict};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use terraglue_checkpoint::{Checkpoint, Keeper, Resumed, require_states};
 use terraglue_diagnostics::{Error, Result};
@@ -22,7 +20,7 @@ use terraglue_recording::{
 };
 use terraglue_reload::{ReloadOptions, Reloader};
 use terraglue_scenario::{InputError, Scenario};
-use terraglue_subsystem::Kind;
+use terraglue_serve::SharedRecorder;
 
 /// What a run leaves behind beside its files.
 pub struct Outcome {
@@ -54,6 +52,9 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let mut options = options(arguments, &interrupt.flag());
     let checkpoint = command.resume.as_deref().map(|folder| resumable(folder, &mut options)).transpose()?;
     let scenario = scenario(command, checkpoint.as_ref(), &options)?;
+    if command.serve {
+        return serve::run(command, &scenario, &interrupt);
+    }
     let loading = Waiting::loading(arguments.quiet);
     let mut testbed = build(&scenario, &options)?;
     drop(loading);
@@ -168,39 +169,6 @@ fn reloader(command: &RunCommand, scenario: &Scenario, options: &Options) -> Res
     Reloader::new(scenario, options, wanted).map(Some)
 }
 
-/// Options of the testbed.
-pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
-    Options {
-        threads: arguments.threads,
-        module_paths: arguments.scenario.module_path.clone(),
-        cancel: Arc::clone(cancel),
-        standing: Arc::default(),
-    }
-}
-
-/// Builds a testbed. Whatever stops it, a module that refuses its files among them, is wrong input.
-pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
-    let process_state = ProcessState::now();
-    let library = terraglue_fmu::library().with_adviser(Kind::Soil, terraglue_soil_law::advice);
-    let built = Testbed::build_with(scenario, options, &library).map_err(|error| match error {
-        Error::Input(_) | Error::Module { function: "instantiate", .. } => error,
-        other => Error::Input(InputError::plain(other.to_string(), None)),
-    });
-    set_back(&process_state);
-    built
-}
-
-/// Tells what had to be set back.
-fn set_back(process_state: &ProcessState) {
-    let changed = process_state.restore();
-    if !changed.is_empty() {
-        let changed = changed.join(", ");
-        log::warn!(
-            "a module or FMU changed what all share, {changed}: it is set back; `isolate = true` keeps such a one apart"
-        );
-    }
-}
-
 /// What a run is recorded into, and from where on.
 pub struct Records<'a> {
     /// The scenario.
@@ -233,7 +201,7 @@ pub fn run_testbed(
         }
     };
     let mut recorder = SharedRecorder::new(recorder);
-    let exit_hook = recorder.exit_hook(scenario, folder);
+    let exit_hook = recorder.exit_hook(scenario, folder, show::error);
     // an error below drops the testbed, and with it what modules do at their end, before the exit hook
     let mut testbed = testbed;
     let process_state = ProcessState::now();

@@ -1,6 +1,6 @@
 //! Whether a module that stands in for a soil is a soil, and whether the terrain has one at all.
 
-use super::arguments::ScenarioArguments;
+use super::scenario_arguments::ScenarioArguments;
 use std::path::Path;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::{SearchPath, available_modules};

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::exit_guard::{ExitHook, add_exit_hook};
-use terraglue_recording::KeptFile;
+use terraglue_host::kept_file::KeptFile;
 
 /// A table that is written line by line.
 #[derive(Clone)]

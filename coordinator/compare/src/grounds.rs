@@ -2,8 +2,8 @@
 
 use base64::Engine;
 use std::fmt::Write;
+use terraglue_page::colour_map::Palette;
 use terraglue_recording::REPORT;
-use terraglue_recording::report::colour_map::Palette;
 use terraglue_recording::report::html::{escape, number, with_prefix};
 use terraglue_recording::report::picture;
 use terraglue_recording::{GroundRecord, Recording};
@@ -122,7 +122,9 @@ mod tests {
     }
 
     fn of(ground: GroundRecord) -> Recording {
-        Recording { final_ground: Some(ground), ..Recording::default() }
+        let mut recording = Recording::default();
+        recording.final_ground = Some(ground);
+        recording
     }
 
     #[test]

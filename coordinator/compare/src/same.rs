@@ -101,7 +101,8 @@ mod tests {
     /// What is found against a reference with this text that ends at this time.
     fn against(text: &str, end_s: f64) -> Vec<String> {
         let scenario = Scenario::parse(TEXT, "walk.toml", &[]).expect("good");
-        let mut recording = Recording { first_frame: Some("robot/body".into()), ..Recording::default() };
+        let mut recording = Recording::default();
+        recording.first_frame = Some("robot/body".into());
         recording.header.entries = BTreeMap::from([("scenario_text".to_owned(), text.to_owned())]);
         let poses = recording.poses.entry("robot/body".into()).or_default();
         poses.t_s.push(end_s);

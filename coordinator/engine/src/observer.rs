@@ -25,7 +25,7 @@ pub struct SubsystemView<'a> {
 pub struct StreamView {
     /// Its full name, `subsystem.stream`.
     pub name: String,
-    /// What it says about itself.
+    /// Its description.
     pub info: terraglue_subsystem::StreamInfo,
     /// Times (s) and bytes, in the order in which they were made.
     pub messages: Vec<(f64, Vec<u8>)>,
@@ -63,7 +63,7 @@ pub struct View<'a> {
     pub h_s: f64,
     /// All subsystems in the order of their names.
     pub subsystems: &'a [SubsystemView<'a>],
-    /// How the last step was glued; of step 0 all zero.
+    /// Gluing of the last step; of step 0 all zero.
     pub gluing: &'a StepReport,
     /// Sum over all subsystems.
     pub energy: Energy,
@@ -87,28 +87,28 @@ pub trait Observer {
     /// Before the first step.
     ///
     /// # Errors
-    /// What the observer cannot do, such as writing a file; it ends the run.
+    /// Failure of the observer, such as of writing a file; it ends the run.
     fn started(&mut self, _view: &View) -> Result {
         Ok(())
     }
     /// After every commit.
     ///
     /// # Errors
-    /// What the observer cannot do, such as writing a file; it ends the run.
+    /// Failure of the observer, such as of writing a file; it ends the run.
     fn stepped(&mut self, _view: &View) -> Result {
         Ok(())
     }
     /// An event, a `set`, an action, a warning of the run.
     ///
     /// # Errors
-    /// What the observer cannot do, such as writing a file; it ends the run.
+    /// Failure of the observer, such as of writing a file; it ends the run.
     fn event(&mut self, _event: &Event) -> Result {
         Ok(())
     }
     /// After the last step, also of a run that failed or was stopped.
     ///
     /// # Errors
-    /// What the observer cannot do, such as writing a file; it ends the run.
+    /// Failure of the observer, such as of writing a file; it ends the run.
     fn finished(&mut self, _view: &View, _error: Option<&Error>) -> Result {
         Ok(())
     }

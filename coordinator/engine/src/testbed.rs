@@ -5,7 +5,7 @@
 //! (5) commit of all, in the order of their names; then those that see look at the committed world. Reads see committed values only.
 
 use crate::observer::{Event, Observer, SubsystemView, View, ledger_of};
-use crate::signals::Signals;
+use crate::signals::{Moment, Signals};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,6 +22,7 @@ mod explain;
 mod glued;
 mod group;
 mod hosted;
+mod loops;
 mod pieces;
 mod reload;
 mod run_clock;
@@ -29,6 +30,7 @@ mod schedule;
 mod shown;
 mod sight;
 mod standing;
+mod step_order;
 mod streams;
 mod subsystems;
 mod uncoupled;
@@ -42,7 +44,7 @@ use streams::Streams;
 use subsystems::Subsystems;
 use uncoupled::Uncoupled;
 
-/// What a run needs beside its scenario.
+/// Options of a run beside its scenario.
 ///
 /// ```
 /// use std::sync::atomic::Ordering;
@@ -129,7 +131,7 @@ pub struct Testbed {
     /// Whether steps may be cut so that one ends at the time of an event.
     exact: bool,
     events: Vec<Event>,
-    /// How the last nominal step was glued, all groups and parts.
+    /// Gluing of the last nominal step, all groups and parts.
     report: StepReport,
     timings: Timings,
     cancel: Arc<AtomicBool>,
@@ -142,13 +144,13 @@ pub struct Testbed {
     max_halvings: u32,
 }
 
-/// Where a testbed stood; see [`Testbed::snapshot`].
+/// State of a testbed; see [`Testbed::snapshot`].
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     slot: u32,
     clock: RunClock,
     fired: Vec<bool>,
-    /// What each group, signals, contact detection, the control of the steps and streams keep from step to step.
+    /// Memory of each group, signals, contact detection, the control of the steps and streams from step to step.
     memory: Vec<Vec<u64>>,
 }
 
@@ -173,7 +175,7 @@ impl Testbed {
         &self.subsystems.instances
     }
 
-    /// How the last step was glued.
+    /// Report of the gluing in the last step.
     pub fn report(&self) -> &StepReport {
         &self.report
     }
@@ -194,10 +196,9 @@ impl Testbed {
         while self.clock.is_before(end) {
             let (start, times) = uncoupled::watch(&self.clock, !self.glued.groups.is_empty());
             self.apply_events()?;
-            self.transfer_signals()?;
+            self.transfer_signals(time_left(self, end).min(longest))?;
             self.timings.charge_sample(Part::Signals, start, times);
-            let next = if self.exact { self.signals.next_time(self.clock.t) } else { f64::INFINITY };
-            let left = self.clock.stop(next, end) - self.clock.t;
+            let left = time_left(self, end);
             let h_now = self.glued.next_length((longest, left), &self.clock, &mut self.subsystems)?;
             match self.communication_step(h_now, end)? {
                 Outcome::Converged => {
@@ -235,14 +236,15 @@ impl Testbed {
         Ok(())
     }
 
-    /// (2) Outputs of t become inputs of the step.
-    fn transfer_signals(&mut self) -> Result {
+    /// (2) Outputs of t become inputs of the step of length h.
+    fn transfer_signals(&mut self, h: f64) -> Result {
         let instances = &mut self.subsystems.instances;
         if self.clock.index == 0 && self.clock.t == 0.0 {
             self.signals.initialize(instances)?;
         }
         let (t_s, events) = (self.clock.t, &mut self.events);
-        self.signals.transfer((t_s, self.clock.step_s), instances, |(label, begins)| {
+        let moment = Moment { t: t_s, h, nominal: self.clock.nominal };
+        self.signals.transfer(moment, self.clock.step_s, instances, |(label, begins)| {
             let what = format!("fault {}: {label}", if begins { "begins" } else { "ends" });
             events.push(Event { t_s, what });
         })
@@ -251,7 +253,8 @@ impl Testbed {
     /// (3) to (5) for one step of length h; nothing is committed unless it converged.
     fn communication_step(&mut self, h: f64, end: f64) -> Result<Outcome> {
         let (start, times) = uncoupled::watch(&self.clock, !self.glued.groups.is_empty());
-        let early = self.uncoupled.advance(&self.clock, (h, end), &mut self.subsystems)?;
+        let early =
+            self.uncoupled.advance(&self.clock, (h, end), &mut self.signals.links, &mut self.subsystems)?;
         if let Some(why) = early {
             return Ok(Outcome::NotConverged(why));
         }
@@ -274,7 +277,7 @@ impl Testbed {
     /// left to the caller, who knows whether the run goes on.
     ///
     /// # Errors
-    /// What [`Testbed::step`] or an observer runs into.
+    /// Errors of [`Testbed::step`] or of an observer.
     pub fn run_until(&mut self, until_s: f64, observers: &mut [&mut dyn Observer]) -> Result {
         while self.clock.is_before(until_s) && !self.cancelled() {
             let stepped = self.step();
@@ -289,15 +292,15 @@ impl Testbed {
         Ok(())
     }
 
-    /// Where the time of all steps went.
+    /// Times of the parts of all steps.
     pub fn timings(&self) -> Timings {
         let mut sum = self.timings.clone();
         self.glued.groups.iter().for_each(|g| sum.add(&g.problem.timings));
         sum
     }
 
-    /// What the steps of each subsystem have cost so far, s of wall time. Without glue: the steps that were watched, times
-    /// the steps that each stands for; with glue: all calls in a step.
+    /// Cost of the steps of each subsystem so far, s of wall time. Without glue: the steps that were watched, times the
+    /// steps that each stands for; with glue: all calls in a step.
     pub fn costs(&self) -> impl Iterator<Item = (&str, f64)> {
         let cost = |slot| self.subsystems.cost(slot).as_secs_f64();
         self.instances().iter().enumerate().map(move |(slot, i)| (i.name(), cost(slot)))
@@ -391,7 +394,7 @@ impl Testbed {
     /// Ends all subsystems. FMUs are told to terminate and are freed; what goes wrong there is an error too.
     ///
     /// # Errors
-    /// What a subsystem did instead of ending.
+    /// Error of a subsystem at its end.
     pub fn close(self) -> Result {
         let (time_s, teardown_errors) = (self.clock.t, self.teardown_errors.clone());
         drop(self);
@@ -428,7 +431,7 @@ impl Testbed {
         self.restore_rest(snapshot)
     }
 
-    /// What a snapshot holds beside the states of the instances.
+    /// Restores the content of a snapshot beside the states of the instances.
     fn restore_rest(&mut self, snapshot: &Snapshot) -> Result {
         self.clock = snapshot.clock;
         self.signals.time_line.set_fired(&snapshot.fired);
@@ -442,4 +445,11 @@ impl Testbed {
 /// Without the digits that arithmetic leaves: 0.3 and not 0.30000000000000004.
 fn twelve_digits(x: f64) -> f64 {
     format!("{x:.11e}").parse().unwrap_or(x)
+}
+
+/// Time to the next event or the end of the step, s.
+fn time_left(testbed: &Testbed, end: f64) -> f64 {
+    let clock = &testbed.clock;
+    let next = if testbed.exact { testbed.signals.next_time(clock.t) } else { f64::INFINITY };
+    clock.stop(next, end) - clock.t
 }

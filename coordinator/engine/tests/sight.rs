@@ -1,4 +1,4 @@
-//! What sensors see in a run: the committed world at the time that they ask for, the same for every order and number of
+//! Sight of sensors in a run: the committed world at the time that they ask for, the same for every order and number of
 //! threads, and streams within their bounds.
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -181,7 +181,7 @@ fn looker(name: &str, more: &str) -> String {
     format!("[{name}]\nmodule = \"looker\"\nmount = \"mover.ball\"\n{more}\n")
 }
 
-/// What each sensor saw in five steps.
+/// Measurements of each sensor in five steps.
 fn seen(tables: &str, threads: usize) -> Vec<(String, f64, f64, Vec<f64>)> {
     let _alone = ALONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     SEEN.lock().unwrap().clear();

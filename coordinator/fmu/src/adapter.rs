@@ -1,6 +1,7 @@
 //! An FMU as a subsystem: trials by its saved states, values by name, every error with what the FMU said.
 
 mod elements;
+mod opening;
 
 use super::bodies::{Axis, Bodies, terminals};
 use super::clocks;
@@ -12,10 +13,8 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use terraglue_fmi::description::Start;
-use terraglue_fmi::{
-    Advance, Error as FmiError, Fmu, FmuInstance, FmuState, InstanceOptions, LogLine, Stepped,
-};
+use terraglue_fmi::description::{ModelDescription, Start};
+use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, FmuState, Stepped};
 use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{
@@ -53,36 +52,37 @@ pub struct FmuSubsystem {
     /// Arrays by reference that are being set element by element before the initialisation.
     starts: BTreeMap<u32, Vec<Option<f64>>>,
     feeds_through: bool,
+    /// Whether an output at the end of a step may depend on an input of the step at once.
+    step_feeds_through: bool,
+    /// Time of the FMU at t = 0, s.
+    start_time_s: f64,
     teardown_errors: TeardownErrors,
 }
 
 impl FmuSubsystem {
     /// Opens an FMU, sets `start` and enters initialisation mode; the first step ends it, so that values which are
-    /// connected at the start are set while the FMU initialises. Host keys: `on_nan`, `event_mode`, `rollback`.
+    /// connected at the start are set while the FMU initialises. Host keys: `on_nan`, `event_mode`, `rollback`, `tolerance`,
+    /// `start_time_s`, `stop_time_s`, `log_categories`, `strict`, `trace`, `bodies`.
     ///
     /// # Errors
     /// What is wrong with the FMU, or a start value that it does not take.
     pub fn new(path: &Path, parameters: &Map<String, Value>, host: Arc<dyn Host>) -> Result<Self> {
         let fmu = Fmu::open(path).map_err(error)?;
         let (options, start) = options(parameters)?;
-        for problem in &fmu.description().problems {
-            host.log(LogLevel::Warning, problem);
-        }
-        let sink = host.clone();
-        let log = Box::new(move |line: &LogLine| sink.log(line.level, &line.text));
-        let plain = InstanceOptions::new(host.name(), log);
-        let made = InstanceOptions { event_mode: options.event_mode, ..plain };
-        let mut instance = FmuInstance::instantiate(&fmu, made).map_err(error)?;
+        opening::warn(&fmu, options.strict, &*host)?;
+        let mut instance =
+            FmuInstance::instantiate(&fmu, opening::of_instance(&options, &host)?).map_err(error)?;
         let (structure, start) = structure(instance.description(), start)?;
         let structure: Vec<(&str, i128)> = structure.iter().map(|(name, n)| (name.as_str(), *n)).collect();
         instance.configure(&structure).map_err(error)?;
         let description = instance.description().clone();
         let capabilities = description.capabilities;
         let (variables, places) = map::variables(&description, options.event_mode && capabilities.event_mode);
+        let clocks = clocks::concerned(&places);
         let mut subsystem = Self {
             instance,
             variables,
-            clocks: clocks::concerned(&places),
+            clocks,
             places: places.into(),
             has_bodies: false,
             before: FmuState::default(),
@@ -97,7 +97,10 @@ impl FmuSubsystem {
             references: RefCell::default(),
             bodies: Bodies::default(),
             starts: BTreeMap::new(),
-            feeds_through: feeds_through(&description),
+            feeds_through: feeds_through(&description, &description.initial_unknowns),
+            // a clock ticks at a communication point, with the values of that time
+            step_feeds_through: !clocks && feeds_through(&description, &[]),
+            start_time_s: options.start_time_s,
             teardown_errors: TeardownErrors::default(),
             host,
         };
@@ -105,21 +108,15 @@ impl FmuSubsystem {
             subsystem.set_start(&name, &value)?;
         }
         subsystem.start_arrays()?;
-        let places = &subsystem.places;
-        let axis = |p: &ValueLocation| Axis {
-            reference: p.reference,
-            element: p.element as usize,
-            count: p.count as usize,
-        };
-        let place = |id: u32| places.get(id as usize).map(axis);
-        let terminals = terminals(&description);
-        subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
+        subsystem.bodies = bodies(&subsystem, &options.bodies, &description)?;
         subsystem.has_bodies = !subsystem.bodies.is_empty();
         if subsystem.has_bodies && !subsystem.can_go_back {
             let text = "glued bodies need an FMU that can save its state, to repeat a step";
             return Err(Error::Refused(text.into()));
         }
-        subsystem.instance.enter_initialization(0.0, None, None).map_err(error)?;
+        let tolerance = options.tolerance.or(description.experiment.tolerance);
+        let (start, stop) = (options.start_time_s, options.stop_time_s);
+        subsystem.instance.enter_initialization(start, stop, tolerance).map_err(error)?;
         Ok(subsystem)
     }
 
@@ -223,14 +220,14 @@ impl FmuSubsystem {
             return Ok(());
         }
         let for_good = !self.kept.get();
-        let Self { instance, bodies, variables, places, before, .. } = self;
+        let Self { instance, bodies, variables, places, before, start_time_s, .. } = self;
         let number = |(v, place): &(&Variable, &ValueLocation)| {
             let output = v.causality == terraglue_subsystem::Causality::Output;
             output && v.value_type == ValueType::F64 && place.count == 1
         };
         let outputs = variables.iter().zip(places.iter()).filter(number);
         let outputs: Vec<(&str, u32)> = outputs.map(|(v, p)| (v.name.as_str(), p.reference)).collect();
-        let short = Advance { t: step.t, h: step.h, for_good };
+        let short = Advance { t: *start_time_s + step.t, h: step.h, for_good };
         rollback::prove(
             instance,
             before,
@@ -249,6 +246,7 @@ impl FmuSubsystem {
         if begins {
             self.instance.exit_initialization().map_err(error)?;
             self.running = true;
+            opening::warn_of_length(self.instance.description(), step.h, &*self.host);
         }
         if step.h == 0.0 && self.has_bodies {
             self.bodies.still(&mut self.instance, step, wrench, out, error)?;
@@ -365,11 +363,14 @@ impl FmuSubsystem {
     }
 }
 
-/// Whether an output at the start may depend on an input of the same time.
-fn feeds_through(description: &terraglue_fmi::ModelDescription) -> bool {
+/// Whether an output, or another one of these, may depend on an input of the same time.
+fn feeds_through(
+    description: &terraglue_fmi::ModelDescription,
+    others: &[terraglue_fmi::description::Unknown],
+) -> bool {
     let is_input =
         |k: &usize| description.variables[*k].causality == terraglue_fmi::description::Causality::Input;
-    let unknowns = description.initial_unknowns.iter().chain(&description.outputs);
+    let unknowns = others.iter().chain(&description.outputs);
     let mut all = unknowns.map(|u| u.dependencies.as_ref().is_none_or(|d| d.iter().any(is_input)));
     let inputs = (0..description.variables.len()).any(|k| is_input(&k));
     inputs && all.any(|depends| depends)
@@ -408,13 +409,15 @@ impl Subsystem for FmuSubsystem {
             if c.serialize && !self.clocks { Capabilities::SERIALIZE } else { Capabilities::default() };
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
+        let of_step =
+            if self.step_feeds_through { Capabilities::STEP_FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
         let derivatives =
             match self.instance.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives() {
                 true => Capabilities::DERIVATIVES,
                 false => Capabilities::default(),
             };
-        retry | bytes | force | through | fixed | derivatives
+        retry | bytes | force | through | of_step | fixed | derivatives
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
@@ -448,7 +451,8 @@ impl Subsystem for FmuSubsystem {
             return Ok(());
         }
         self.open = true;
-        match self.instance.do_step(Advance { t: step.t, h: step.h, for_good: !self.kept.get() }) {
+        let t = self.start_time_s + step.t;
+        match self.instance.do_step(Advance { t, h: step.h, for_good: !self.kept.get() }) {
             Ok(Stepped { terminate: false, .. }) => {}
             other => return Err(self.stopped(step, other)),
         }
@@ -632,4 +636,15 @@ impl Drop for FmuSubsystem {
             self.teardown_errors.put(format!("`{}` at its end: {error}", self.host.name()));
         }
     }
+}
+
+/// The bodies that the options name.
+fn bodies(of: &FmuSubsystem, named: &Map<String, Value>, description: &ModelDescription) -> Result<Bodies> {
+    let axis = |p: &ValueLocation| Axis {
+        reference: p.reference,
+        element: p.element as usize,
+        count: p.count as usize,
+    };
+    let place = |id: u32| of.places.get(id as usize).map(axis);
+    Bodies::read(named, &of.variables, &terminals(description), place)
 }

@@ -15,14 +15,16 @@ mod driven_bodies;
 pub mod export;
 mod inputs;
 mod map;
+pub mod references;
 mod rollback;
 mod settings;
 pub mod simulate;
 mod table;
+pub mod trace;
 
 pub use adapter::FmuSubsystem;
 pub use driven_bodies::DrivenBodiesModule;
-pub use settings::OnNan;
+pub use settings::{OnNan, start_values};
 
 use terraglue_host::Library;
 

@@ -1,6 +1,7 @@
 //! The table of an FMU in a scenario: keys of the host, structural parameters and start values.
 
 use serde_json::{Map, Value};
+use std::path::PathBuf;
 use terraglue_subsystem::{Error, Result};
 
 /// What a value that is no number does.
@@ -22,14 +23,44 @@ pub struct Options {
     pub rollback: bool,
     /// Glued bodies by name.
     pub bodies: Map<String, Value>,
+    /// Relative tolerance; none: that of the description.
+    pub tolerance: Option<f64>,
+    /// Time of the FMU at t = 0 of the run, s.
+    pub start_time_s: f64,
+    /// Time of the FMU after which it is not stepped, s.
+    pub stop_time_s: Option<f64>,
+    /// Categories of its log that are switched on.
+    pub log_categories: Vec<String>,
+    /// Whether defects of its description are errors.
+    pub strict: bool,
+    /// File that takes a line for each call, if any.
+    pub trace: Option<PathBuf>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            on_nan: OnNan::Stop,
+            event_mode: false,
+            rollback: true,
+            bodies: Map::new(),
+            tolerance: None,
+            start_time_s: 0.0,
+            stop_time_s: None,
+            log_categories: Vec::new(),
+            strict: false,
+            trace: None,
+        }
+    }
 }
 
 /// The host's keys and the start values, whose nested tables become dotted names.
 pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String, Value)>)> {
-    let mut options = Options { on_nan: OnNan::Stop, event_mode: false, rollback: true, bodies: Map::new() };
+    let mut options = Options::default();
     let mut start = Vec::new();
     for (key, value) in parameters {
         let wrong = |takes: &str| Error::Refused(format!("`{key}` takes {takes}, not {value}"));
+        let time = || value.as_f64().filter(|x| x.is_finite()).ok_or_else(|| wrong("a time in s"));
         match (key.as_str(), value) {
             ("on_nan", Value::String(t)) if t == "stop" => options.on_nan = OnNan::Stop,
             ("on_nan", Value::String(t)) if t == "warn" => options.on_nan = OnNan::Warn,
@@ -38,6 +69,22 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
             ("event_mode", _) => return Err(wrong("true or false")),
             ("rollback", Value::Bool(on)) => options.rollback = *on,
             ("rollback", _) => return Err(wrong("true or false")),
+            ("strict", Value::Bool(on)) => options.strict = *on,
+            ("strict", _) => return Err(wrong("true or false")),
+            ("trace", Value::String(path)) => options.trace = Some(path.into()),
+            ("trace", _) => return Err(wrong("the path of a file")),
+            ("tolerance", _) => {
+                let number = value.as_f64().filter(|x| *x > 0.0 && x.is_finite());
+                options.tolerance = Some(number.ok_or_else(|| wrong("a number above 0"))?);
+            }
+            ("start_time_s", _) => options.start_time_s = time()?,
+            ("stop_time_s", _) => options.stop_time_s = Some(time()?),
+            ("log_categories", Value::Array(list)) => {
+                let name = |v: &Value| v.as_str().map(str::to_owned);
+                let names: Option<Vec<String>> = list.iter().map(name).collect();
+                options.log_categories = names.ok_or_else(|| wrong("a list of names"))?;
+            }
+            ("log_categories", _) => return Err(wrong("a list of names, or [\"all\"]")),
             ("bodies", Value::Object(table)) => options.bodies = table.clone(),
             ("start", Value::Object(below)) => {
                 below.iter().for_each(|(k, v)| flatten(k.clone(), v, &mut start));
@@ -46,6 +93,14 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
         }
     }
     Ok((options, start))
+}
+
+/// Start values in the table of an FMU, without the keys of the host.
+///
+/// # Errors
+/// A key of the host with a value that it does not take.
+pub fn start_values(parameters: &Map<String, Value>) -> Result<Vec<(String, Value)>> {
+    Ok(options(parameters)?.1)
 }
 
 /// Values of structural parameters, and all others, which may be elements of the arrays that those give their sizes.

@@ -4,13 +4,14 @@ use super::inputs::{self, Inputs, set_text};
 use super::map::{element_name, find};
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
-use terraglue_fmi::instance::Sink;
+use terraglue_fmi::instance::{Sink, Trace};
 use terraglue_fmi::{Advance, Error, Fmu, FmuInstance, FmuState, InstanceOptions, ModelDescription, Result};
 use terraglue_subsystem::{ValueType, ValuesMut};
 
 pub use super::table::{InputRow, Table};
 
 /// How an FMU is run.
+#[derive(Default)]
 pub struct Settings {
     /// Start values by name, as text.
     pub start: Vec<(String, String)>,
@@ -30,6 +31,12 @@ pub struct Settings {
     pub input: Arc<Table>,
     /// Whether inputs are held over each step, also of FMUs that follow them within.
     pub hold_inputs: bool,
+    /// Categories of the log that are switched on.
+    pub log_categories: Vec<String>,
+    /// Whether defects of the description are errors.
+    pub strict: bool,
+    /// Takes a line for each call of the FMU.
+    pub trace: Option<Trace>,
 }
 
 /// Takes a line of a table.
@@ -41,6 +48,8 @@ pub struct Tables<'a> {
     pub rows: Line<'a>,
     /// Outputs that the FMU shows at intermediate times, of the steps that stand.
     pub intermediate: Option<Line<'a>>,
+    /// Hands all lines to the system: called before the FMU is ended.
+    pub keep: &'a dyn Fn() -> Result,
 }
 
 /// Share of a step that a number of steps may be off a whole one: it was typed with so many digits.
@@ -55,6 +64,11 @@ const STEPS: f64 = 1e9;
 /// [`Error::WrongInput`]: what of the settings does not fit.
 pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
     let description = fmu.description();
+    if let (true, Some(first)) = (settings.strict, description.warnings().first()) {
+        return Err(Error::WrongInput(format!(
+            "its description has defects, which --strict refuses: {first}"
+        )));
+    }
     plan(fmu, settings)?;
     columns(description, &settings.outputs, settings.event_mode)?;
     if between {
@@ -74,16 +88,10 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
     };
-    let (event_mode, plain) = (settings.event_mode, InstanceOptions::new("unit", sink));
-    let followed = match settings.hold_inputs {
-        true => Vec::new(),
-        false => inputs::followed(fmu.description(), &settings.input),
-    };
-    let options = InstanceOptions { event_mode, intermediate: intermediate.clone(), followed, ..plain };
-    let mut instance = FmuInstance::instantiate(fmu, options)?;
+    let mut instance = instance(fmu, settings, sink, intermediate.clone())?;
     configure(&mut instance, &settings.start)?;
     let description = instance.description().clone();
-    let columns = columns(&description, &settings.outputs, event_mode)?;
+    let columns = columns(&description, &settings.outputs, settings.event_mode)?;
     let inputs = initialize(&mut instance, settings, (start, stop))?;
     // with event mode a last column says how many events were handled since the row before
     let marked = |text: String, events: u32| match settings.event_mode {
@@ -120,10 +128,33 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let now = ended.unwrap_or(end);
         row(&marked(line(&instance, now, &columns).map_err(|e| named(e, now))?, events))
     });
+    (tables.keep)()?;
     drop(instance.release(&mut before.state));
     outcome?;
     instance.terminate()?;
     Ok(ended)
+}
+
+/// An instance that shows these outputs at intermediate times.
+fn instance(
+    fmu: &Arc<Fmu>,
+    settings: &Settings,
+    sink: Sink,
+    intermediate: Vec<String>,
+) -> Result<FmuInstance> {
+    let followed = match settings.hold_inputs {
+        true => Vec::new(),
+        false => inputs::followed(fmu.description(), &settings.input),
+    };
+    let options = InstanceOptions {
+        event_mode: settings.event_mode,
+        intermediate,
+        followed,
+        log_categories: settings.log_categories.clone(),
+        trace: settings.trace.clone(),
+        ..InstanceOptions::new("unit", sink)
+    };
+    FmuInstance::instantiate(fmu, options)
 }
 
 /// The steps of a run.
@@ -218,8 +249,8 @@ fn halving(
         let made = instance.do_step(Advance { t, h: h.min(end - t), for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
             for row in instance.take_intermediate() {
-                let values: String = row.values.iter().map(|x| format!(",{x}")).collect();
-                write(&format!("{}{values},{}", row.t, u8::from(row.finished)))?;
+                let values: String = row.values.iter().map(|x| format!(",{}", exact(*x))).collect();
+                write(&format!("{}{values},{}", exact(row.t), u8::from(row.finished)))?;
             }
         }
         if made.is_ok() {
@@ -303,9 +334,22 @@ fn quoted(text: &str) -> String {
     }
 }
 
+/// A number with as many digits as reading it needs to give the same bits.
+fn exact(x: f64) -> String {
+    short(x, x.abs())
+}
+
+/// The shortest digits of a number of this size, with an exponent where it is very small or large.
+fn short<T: std::fmt::Display + std::fmt::LowerExp>(x: T, size: f64) -> String {
+    match size == 0.0 || (1e-5..1e16).contains(&size) {
+        true => x.to_string(),
+        false => format!("{x:e}"),
+    }
+}
+
 /// One line of the table; numbers are written so that reading them gives the same bits.
 fn line(instance: &FmuInstance, t: f64, columns: &[&Variable]) -> Result<String> {
-    let mut text = t.to_string();
+    let mut text = exact(t);
     for v in columns {
         for value in read(instance, v)? {
             text.push(',');
@@ -324,18 +368,18 @@ fn read(instance: &FmuInstance, v: &Variable) -> Result<Vec<String>> {
         }};
     }
     macro_rules! numbers {
-        ($variant:ident, $zero:expr) => {{
+        ($variant:ident, $zero:expr, $show:expr) => {{
             let mut out = vec![$zero; v.len()];
             instance.get(&[v.reference], ValuesMut::$variant(&mut out))?;
             if let Some(wrong) = out.iter().find(|x| !x.is_finite()) {
                 return Err(Error::Refused(format!("the variable `{}` is {wrong}", v.name)));
             }
-            Ok(out.iter().map(ToString::to_string).collect())
+            Ok(out.iter().map($show).collect())
         }};
     }
     match v.value_type {
-        ValueType::F64 => numbers!(F64, f64::NAN),
-        ValueType::F32 => numbers!(F32, f32::NAN),
+        ValueType::F64 => numbers!(F64, f64::NAN, |x: &f64| exact(*x)),
+        ValueType::F32 => numbers!(F32, f32::NAN, |x: &f32| short(*x, x.abs() as f64)),
         ValueType::I8 => values!(I8, 0, |x: &i8| x.to_string()),
         ValueType::I16 => values!(I16, 0, |x: &i16| x.to_string()),
         ValueType::I32 => values!(I32, 0, |x: &i32| x.to_string()),

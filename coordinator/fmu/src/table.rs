@@ -1,5 +1,7 @@
 //! Inputs over time: rows of cells, and numbers by straight lines between them.
 
+use std::io::Read;
+use std::path::Path;
 use terraglue_fmi::Error;
 
 /// Inputs over time. Cells stay as they are written, because whole numbers of 64 bits do not fit into f64.
@@ -23,6 +25,43 @@ pub struct InputRow {
 }
 
 impl Table {
+    /// Reads a table from a file: a header that begins with `time`, rows that ascend in time. With `jumps` the last of several rows of one
+    /// time counts, as in results with events.
+    ///
+    /// # Errors
+    /// What is wrong, with path and line.
+    pub fn read(path: &Path, jumps: bool) -> Result<Self, String> {
+        let file = terraglue_subsystem::files::open(path).map_err(|e| e.to_string());
+        file.and_then(|file| Self::parse(file, jumps)).map_err(|e| format!("{}: {e}", path.display()))
+    }
+
+    /// The same from any text.
+    ///
+    /// # Errors
+    /// What is wrong, with the line.
+    pub fn parse(text: impl Read, jumps: bool) -> Result<Self, String> {
+        let mut reader = csv::Reader::from_reader(text);
+        let header = reader.headers().map_err(|e| e.to_string())?.clone();
+        if header.get(0) != Some("time") {
+            return Err("the first column is not `time`".into());
+        }
+        let mut rows: Vec<InputRow> = Vec::new();
+        for (record, line) in reader.records().zip(2..) {
+            let record = record.map_err(|e| e.to_string())?;
+            let mut cells = record.iter().map(|t| t.trim().to_owned());
+            let time = cells.next().and_then(|t| t.parse().ok()).filter(|t: &f64| t.is_finite());
+            let time = time.ok_or_else(|| format!("line {line}: the time is no number"))?;
+            rows.pop_if(|before| jumps && before.time == time);
+            if rows.last().is_some_and(|before| before.time >= time) {
+                return Err(format!("line {line}: the time does not grow"));
+            }
+            let cells: Vec<String> = cells.collect();
+            let numbers = cells.iter().map(|t| t.parse().unwrap_or(f64::NAN)).collect();
+            rows.push(InputRow { time, cells, numbers });
+        }
+        Ok(Self { names: header.iter().skip(1).map(str::to_owned).collect(), rows })
+    }
+
     /// The last row at or before t, or the first of all, and the row after it.
     fn around(&self, t: f64) -> Option<(&InputRow, Option<&InputRow>)> {
         let next = self.rows.partition_point(|r| r.time <= t);
@@ -33,7 +72,7 @@ impl Table {
     }
 
     /// A number at t by straight lines between the rows; the first and last row hold beyond.
-    fn number(&self, t: f64, column: usize) -> f64 {
+    pub(super) fn number(&self, t: f64, column: usize) -> f64 {
         match self.around(t) {
             Some((a, Some(b))) => {
                 let s = (t - a.time) / (b.time - a.time);

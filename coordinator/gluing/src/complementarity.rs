@@ -11,7 +11,7 @@ use terraglue_numerics::least_norm::TruncatedSolver;
 /// Pivots weaker than this make the system one for the truncated solver.
 const WEAK: f64 = 1e-10;
 
-/// Where a component stands.
+/// Status of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Free,

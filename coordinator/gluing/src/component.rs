@@ -8,7 +8,7 @@ use terraglue_subsystem::Level;
 /// A component with the wrench on it and the motion of both sides.
 #[derive(Clone, Copy, Debug)]
 pub struct Component<'a> {
-    /// What holds at all components.
+    /// Conditions at all components.
     pub(super) conditions: &'a Conditions,
     /// Number of this one.
     pub(super) i: usize,
@@ -26,7 +26,7 @@ pub struct Component<'a> {
     pub(super) has_grounds: bool,
 }
 
-/// What passes a component of the interface in a step, J.
+/// Energy that passes a component of the interface in a step, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PassedEnergy {
     /// Work on both sides together, beyond what springs stored and what became heat; at a contact with soil the work on the
@@ -89,7 +89,8 @@ impl Component<'_> {
         self.bodies_part() + surface + self.compliance() * self.t
     }
 
-    /// What the bodies' motion contributes to the mismatch: without the force of the glue's spring and the soil's surface.
+    /// Contribution of the bodies' motion to the mismatch: without the force of the glue's spring and the soil's
+    /// surface.
     pub fn bodies_part(&self) -> f64 {
         let (i, rate) = (self.i, self.rate());
         let damper = self.compliance() * self.damping() * rate;
@@ -108,13 +109,13 @@ impl Component<'_> {
         self.first.x[i] + self.gap() + damper - if self.is_on_surface() { 0.0 } else { self.second.x[i] }
     }
 
-    /// How far a closed joint lies apart at t + h beyond what its spring and damper allow, m or rad.
+    /// Gap of a closed joint at t + h beyond the share of its spring and damper, m or rad.
     pub fn joint_gap(&self) -> f64 {
         let force = self.t + self.damping() * self.rate();
         (self.moved_apart() + self.gap() + self.compliance() * force).abs()
     }
 
-    /// What passes in the step, with the wrench of the step before where there was one.
+    /// Energy that passes in the step, with the wrench of the step before if there was one.
     pub fn passed(&self, t_before: Option<f64>) -> PassedEnergy {
         let (i, t) = (self.i, self.t);
         let through = (t * self.first.x[i]).abs();

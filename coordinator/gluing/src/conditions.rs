@@ -1,5 +1,5 @@
-//! What holds at each component of the interface in a step: its kind, who answers it, the spring and damper of the glue, and the level
-//! at which joints are closed. Written when the step begins; no trial changes it.
+//! Conditions at each component of the interface in a step: its kind, the side that answers it, the spring and damper
+//! of the glue, and the level at which joints are closed. Written when the step begins; no trial changes it.
 
 use super::glue::{ConstraintKind, Joint};
 use terraglue_subsystem::{Level, Port};

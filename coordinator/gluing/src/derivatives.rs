@@ -8,7 +8,7 @@ use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_subsystem::{Capabilities, Level, Port};
 
-/// Where the bodies' interface Jacobian comes from.
+/// Source of the bodies' interface Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Derivatives {
     /// The modules' own, by forward differences where one has none.
@@ -107,7 +107,7 @@ impl InterfaceProblem {
         Ok(())
     }
 
-    /// What dampers of the glue add to the Jacobian: compliance·damping·d(v1 − v2)/dT.
+    /// Contribution of dampers of the glue to the Jacobian: compliance·damping·d(v1 − v2)/dT.
     fn add_dampers(&mut self, instances: &mut [Instance]) -> Result {
         let n = self.n();
         let mut rates = std::mem::take(&mut self.differences.rates);

@@ -3,7 +3,7 @@
 use super::participant::Participant;
 use terraglue_subsystem::Node;
 
-/// What differences keep from trial to trial.
+/// Memory of differences from trial to trial.
 #[derive(Debug, Default)]
 pub struct Differences {
     /// Vectors of the problem while differences change them.

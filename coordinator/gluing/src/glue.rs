@@ -8,7 +8,7 @@ use crate::contact::PortOwner;
 use terraglue_numerics::rotation::{IDENTITY, conjugate, minus, plus, product, turned};
 use terraglue_subsystem::{BodyState, Law, Port, PortKind};
 
-/// What one packed component is.
+/// Kind of one packed component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConstraintKind {
     /// Normal force of a contact: complementary to the gap within the bounds of the law.
@@ -52,6 +52,28 @@ pub struct Joint {
     turning: bool,
     damping: f64,
     axes: [f64; 9],
+    ramp: Ramp,
+}
+
+/// How a joint closes the gap between its points at the start.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ramp {
+    /// Duration, s; 0: the gap is closed at once.
+    duration_s: f64,
+    /// Place of side 1 minus that of side 2 at the start, m.
+    gap_m: [f64; 3],
+    /// Share of it that is left at the end of the step.
+    left: f64,
+}
+
+impl Ramp {
+    /// Takes the time at the end of the step, s. The share falls with rates and accelerations of zero at both ends.
+    fn advance(&mut self, end_s: f64) {
+        if self.duration_s > 0.0 {
+            let s = (end_s / self.duration_s).clamp(0.0, 1.0);
+            self.left = 1.0 - s * s * s * (10.0 + s * (6.0 * s - 15.0));
+        }
+    }
 }
 
 /// All declared glue.
@@ -63,7 +85,7 @@ pub struct Glue {
 /// Ports of declared glue come after those of detected contact.
 const FIRST_KEY: u64 = 1 << 63;
 
-/// How one glue is made.
+/// Parameters of one glue.
 pub struct Recipe {
     /// Number in the scenario, from 0.
     pub number: usize,
@@ -81,6 +103,8 @@ pub struct Recipe {
     pub law: Law,
     /// Damper beside the compliance, N s/m.
     pub damping: f64,
+    /// Time in which a joint closes the gap at the start, s; 0: at once.
+    pub ramp_s: f64,
     /// Unilateral.
     pub contact: bool,
     /// Side 2 is a soil, whose law answers all but the normal force.
@@ -115,6 +139,9 @@ impl Glue {
             law: recipe.law,
         };
         let ends = recipe.ends.map(end);
+        let gap_m = minus(ends[0].place, ends[1].place);
+        let left = f64::from(u8::from(recipe.ramp_s > 0.0));
+        let ramp = Ramp { duration_s: recipe.ramp_s, gap_m, left };
         self.joints.push(Joint {
             number: recipe.number,
             port,
@@ -123,6 +150,7 @@ impl Glue {
             turning: recipe.turning,
             damping: recipe.damping,
             axes: recipe.axes,
+            ramp,
         });
     }
 
@@ -182,16 +210,17 @@ impl Glue {
         self.number(|j| !j.is_contact() && j.port.law.compliance > 0.0)
     }
 
-    /// Who meets at glue k.
+    /// Owners of glue k.
     pub fn owner(&self, k: usize) -> PortOwner {
         let slot = |e: usize| self.joints.get(k).and_then(|j| j.ends[e].slot).map_or(u32::MAX, |s| s as u32);
         let body = self.joints.get(k).map_or(0, |j| j.port.body);
         PortOwner { subsystem: slot(0), ground: slot(1), body, shape: u32::MAX }
     }
 
-    /// Takes the committed poses of all bodies.
-    pub fn place(&mut self, states: impl Fn(usize, u32) -> BodyState) {
+    /// Takes the committed poses of all bodies, for a step that ends at `end_s`, s.
+    pub fn place(&mut self, end_s: f64, states: impl Fn(usize, u32) -> BodyState) {
         for joint in &mut self.joints {
+            joint.ramp.advance(end_s);
             for end in &mut joint.ends {
                 if let Some(slot) = end.slot {
                     let pose = states(slot, end.body).world_from_body;
@@ -245,7 +274,7 @@ impl Joint {
         self.soil
     }
 
-    /// What a component is.
+    /// Kind of a component.
     pub fn row(&self, component: usize) -> ConstraintKind {
         match (self.is_contact(), component, self.soil) {
             (false, ..) => ConstraintKind::Joint,
@@ -260,7 +289,8 @@ impl Joint {
         self.damping
     }
 
-    /// How far the points lay apart at t along a component, m or rad.
+    /// Gap of the points at t along a component, m or rad, beyond what the ramp of the joint leaves at the end of the
+    /// step.
     pub fn gap(&self, port: &Port, component: usize) -> f64 {
         let [a, b] = &self.ends;
         if self.is_contact() {
@@ -268,7 +298,9 @@ impl Joint {
             return if !self.soil && component == 0 { self.along(port, component, a, b) } else { 0.0 };
         }
         if component < 3 {
-            return self.along(port, component, a, b);
+            let d = port.direction(component);
+            let left: f64 = (0..3).map(|k| self.ramp.left * self.ramp.gap_m[k] * d[k]).sum();
+            return self.along(port, component, a, b) - left;
         }
         let q = product(a.turn, conjugate(b.turn));
         let sign = if q[0] < 0.0 { -2.0 } else { 2.0 };

@@ -14,7 +14,7 @@ use terraglue_numerics::dense::max_norm;
 use terraglue_subsystem::Level;
 
 impl InterfaceProblem {
-    /// What is known at t without any trial: T = −(x1 − x2)/compliance of springs, the soil's own force at contacts.
+    /// Forces known at t without any trial: T = −(x1 − x2)/compliance of springs, the soil's own force at contacts.
     pub fn explicit_forces(&mut self) {
         let mut t = std::mem::take(&mut self.t);
         self.law_forces(&mut t);
@@ -119,7 +119,7 @@ impl InterfaceProblem {
         Ok(())
     }
 
-    /// What the wrenches of the last trials miss, F − T, into `miss`; returns its largest component, N and N m. The
+    /// Residual of the wrenches of the last trials, F − T, into `miss`; returns its largest component, N and N m. The
     /// report takes its ratio to the one `before` and its part of T_ref.
     pub fn force_residual(&mut self, miss: &mut Vec<f64>, before: f64) -> f64 {
         miss.clear();

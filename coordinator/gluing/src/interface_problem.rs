@@ -30,7 +30,7 @@ pub struct InterfaceProblem {
     pub estimate: GroupEstimate,
     /// The wrench on the bodies; after a strategy the one to commit.
     pub t: Vec<f64>,
-    /// What side 2 got where that was another wrench; else empty.
+    /// Wrench on side 2 if it was another one; else empty.
     pub t_second: Vec<f64>,
     /// Wrenches of the soils' laws.
     pub law: LawWrenches,
@@ -39,7 +39,7 @@ pub struct InterfaceProblem {
     /// Motion of side 2 of joints at the last trial. At contacts `x` is the surface of the soil, the answer to step 1 and to
     /// every trial.
     pub second: SideMotion,
-    /// What holds at each component.
+    /// Conditions at each component.
     pub conditions: Conditions,
     /// Glue of the scenario.
     pub glue: Glue,
@@ -51,9 +51,9 @@ pub struct InterfaceProblem {
     pub last: Vec<(u64, [f64; 6])>,
     pub(super) work: Vec<f64>,
     rigid: RigidContact,
-    /// Where the time went.
+    /// Times of the parts.
     pub timings: Timings,
-    /// What happened.
+    /// Report of the step.
     pub report: StepReport,
     /// Weight of the glued bodies, N (1 N without gravity): scale of the tolerance.
     pub t_ref: f64,

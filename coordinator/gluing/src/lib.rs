@@ -65,7 +65,7 @@ use terraglue_host::Instance;
 use terraglue_scenario::{GluingSpec, StrategyKind};
 use terraglue_subsystem::Capabilities;
 
-/// How a strategy ended a step. Nothing is committed before it says `Converged`.
+/// Outcome of a step of a strategy. Nothing is committed unless it is `Converged`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// `t`, `first` and `second` of the [`InterfaceProblem`] are to be committed.
@@ -74,7 +74,7 @@ pub enum Outcome {
     NotConverged(String),
 }
 
-/// What the members of a group must be able to do.
+/// Capabilities that the members of a group need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Needs {
     /// Bodies on side 1.
@@ -90,7 +90,7 @@ pub trait Strategy: Send {
     /// Name in the scenario.
     fn name(&self) -> &'static str;
 
-    /// What the members must be able to do.
+    /// Capabilities that the members need.
     fn needs(&self) -> Needs;
 
     /// Why it cannot glue this group, whatever its members can do.
@@ -103,7 +103,7 @@ pub trait Strategy: Send {
         false
     }
 
-    /// What later steps depend on goes into a snapshot.
+    /// Appends the state on which later steps depend, for a snapshot.
     fn remember(&self, _out: &mut Vec<u64>) {}
 
     /// Back to what [`Strategy::remember`] wrote.
@@ -134,7 +134,7 @@ pub fn strategy(spec: &GluingSpec) -> Box<dyn Strategy> {
     }
 }
 
-/// What finds the forces of joints in a step of h = 0 before the first: the same for all strategies.
+/// Strategy for the forces of joints in a step of h = 0 before the first: the same for all strategies.
 pub fn start(spec: &GluingSpec) -> Box<dyn Strategy> {
     Box::new(start::Start::new(spec))
 }

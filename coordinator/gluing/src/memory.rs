@@ -1,4 +1,4 @@
-//! What a group keeps from step to step, as plain words: a snapshot holds all that later steps depend on.
+//! Memory of a group from step to step, as plain words: a snapshot holds all that later steps depend on.
 
 /// Writes numbers one behind the other.
 pub trait Remember {

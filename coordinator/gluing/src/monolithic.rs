@@ -74,7 +74,7 @@ impl Monolithic {
         Ok(max_norm(&self.residual))
     }
 
-    /// How far each component moves under its own force: makes all rows forces.
+    /// Displacement of each component under its own force: makes all rows forces.
     fn measure_scale(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
         let n = problem.n();
         self.scale.clear();

@@ -518,7 +518,7 @@ fn complete(instance: &Instance, function: &'static str, progress: Progress) -> 
     }
 }
 
-/// What a trial is given.
+/// Argument of a trial.
 #[derive(Clone, Copy)]
 enum Given {
     /// The wrench in `given_t`.
@@ -527,7 +527,7 @@ enum Given {
     Motion,
 }
 
-/// Where a trial's answer goes; packed over the group.
+/// Destination of a trial's answer; packed over the group.
 #[derive(Default)]
 pub struct Answer<'a> {
     /// X.

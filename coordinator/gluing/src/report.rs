@@ -1,4 +1,4 @@
-//! What a strategy did in one step; the same for all strategies, so that they can be compared.
+//! Report of a strategy on one step; the same for all strategies, so that they can be compared.
 
 use terraglue_subsystem::{Figure, Overlay};
 
@@ -20,7 +20,7 @@ pub struct StepReport {
     pub jacobian_refreshes: u32,
     /// Communication steps that the nominal step was made of.
     pub parts: u32,
-    /// How often the step was halved.
+    /// Number of halvings of the step.
     pub halvings: u32,
     /// Whether the strategy reached its tolerance (a single pass always does).
     pub converged: bool,

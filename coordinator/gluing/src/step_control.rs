@@ -17,7 +17,7 @@ const SAFETY: f64 = 0.8;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 1.5;
 
-/// What passed one port in the last step: per component F(t), T on side 1, T on side 2, X1, X2.
+/// Passage of one port in the last step: per component F(t), T on side 1, T on side 2, X1, X2.
 #[derive(Clone, Copy, Debug)]
 struct PortPassage {
     key: u64,
@@ -25,7 +25,7 @@ struct PortPassage {
     values: [[f64; 5]; 6],
 }
 
-/// What passed the interface of a group in its last step.
+/// Passage of the interface of a group in its last step.
 #[derive(Clone, Debug, Default)]
 pub struct Passage {
     ports: Vec<PortPassage>,

@@ -65,7 +65,7 @@ struct Columns {
     k_u: [f64; 6],
     z: [f64; 6],
     z_max: [f64; 6],
-    /// Where the tangent is taken: depth of the last trial.
+    /// Point of the tangent: depth of the last trial.
     trial: [f64; 6],
     under_motion: bool,
 }

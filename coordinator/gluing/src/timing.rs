@@ -1,4 +1,4 @@
-//! Where the time of a step goes: wall time by part, for `timing.csv` and the benchmark; never in the recording.
+//! Times of the parts of a step: wall time, for `timing.csv` and the benchmark; never in the recording.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! What the last trials of both sides answered, packed over the ports of a group.
+//! Answers of the last trials of both sides, packed over the ports of a group.
 
 use super::glue::ConstraintKind;
 

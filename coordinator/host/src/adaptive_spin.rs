@@ -1,10 +1,10 @@
-//! How long a thread spins before it sleeps.
+//! Time for which a thread spins before it sleeps.
 
 use std::time::{Duration, Instant};
 
-/// What waking a sleeping thread costs on a virtual machine; waiting longer would cost more than it saves.
+/// Cost of waking a sleeping thread on a virtual machine; waiting longer would cost more than it saves.
 const LONGEST: Duration = Duration::from_micros(50);
-/// What is always worth it: from one loop of a step to the next.
+/// Time that is always worth it: from one loop of a step to the next.
 const SHORTEST: Duration = Duration::from_micros(3);
 /// Looks between two readings of the clock.
 const LOOKS: u32 = 16;

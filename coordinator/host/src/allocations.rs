@@ -75,7 +75,7 @@ unsafe extern "C-unwind" fn operator_new_array(size: usize) -> *mut c_void {
     unsafe { passed_on(&NEW_ARRAY, size) }
 }
 
-/// What is counted.
+/// Functions that are counted.
 const COUNTED: [(&str, *const c_void); 7] = [
     ("malloc", malloc as *const c_void),
     ("calloc", calloc as *const c_void),
@@ -114,7 +114,7 @@ impl AllocationCounter {
     }
 }
 
-/// Where the first byte of a loaded file lies.
+/// Address of the first byte of a loaded file.
 fn base_address(path: &Path) -> Option<usize> {
     let maps = std::fs::read_to_string("/proc/self/maps").ok()?;
     let wanted = path.to_string_lossy();

@@ -5,7 +5,7 @@ use terraglue_subsystem::Step;
 /// Names of the components of a port.
 const COMPONENTS: [&str; 6] = ["n", "t1", "t2", "mn", "mt1", "mt2"];
 
-/// What is wrong with the first entry of a packed vector that is not finite.
+/// Error of the first entry of a packed vector that is not finite.
 pub(super) fn packed(step: &Step, vector: &str, values: &[f64]) -> Option<String> {
     let k = values.iter().position(|v| !v.is_finite())?;
     let port = step.ports.iter().enumerate().find(|(_, p)| p.range().contains(&k));
@@ -19,7 +19,7 @@ pub(super) fn packed(step: &Step, vector: &str, values: &[f64]) -> Option<String
     Some(format!("{vector} is {} at {place}; every component must be answered", values[k]))
 }
 
-/// What is wrong with the first entry of an n × n column-major matrix that is not finite.
+/// Error of the first entry of an n × n column-major matrix that is not finite.
 pub(super) fn matrix(n: usize, name: &str, values: &[f64]) -> Option<String> {
     let k = values.iter().position(|v| !v.is_finite())?;
     Some(format!("{name} is {} in row {}, column {}", values[k], k % n, k / n))

@@ -1,6 +1,6 @@
 //! A crash inside a module that is not isolated: standard error tells which one was called before the process ends as it would have.
 //!
-//! What is called is noted with four words of the thread; the handler reads them and calls nothing but `write`.
+//! Every call is noted with four words of the thread; the handler reads them and calls nothing but `write`.
 #![allow(unsafe_code)] // Signal handlers, and what they may read.
 
 use std::cell::Cell;
@@ -46,7 +46,7 @@ pub(super) fn note(names: &Names, function: &'static str, time_s: f64) {
     LAST.set(LastCall { names, function, time_s });
 }
 
-/// What a thread does before there is an instance, until it ends; what was noted before comes back then.
+/// Note of the work of a thread before there is an instance, until it ends; the earlier note comes back then.
 pub struct Beginning {
     before: LastCall,
     // in a place of its own: the note stays where this value moves

@@ -6,7 +6,7 @@ use rustix::process::{
 };
 use std::time::{Duration, Instant};
 
-/// How long a child that is ending already may take.
+/// Largest time for the end of a child that is ending already.
 const GRACE: Duration = Duration::from_millis(100);
 const LOOK: Duration = Duration::from_millis(2);
 /// Children of children come to light when those end.
@@ -14,7 +14,7 @@ const GENERATIONS: usize = 100;
 
 /// From here on processes whose parents end become children of this one, sessions and groups of their own included.
 pub fn adopt() {
-    // Where the system does not know it, such processes go to its own first one.
+    // On systems without this call, such processes go to the first process of the system.
     let _ = set_child_subreaper(Some(getpid()));
 }
 

@@ -1,12 +1,12 @@
-//! What a module says about itself without being run: the section `.terraglue` of a library, or the docstring of a
-//! file in Python, and whether an instance says the same.
+//! Description of a module, readable without running it: the section `.terraglue` of a library, or the docstring of a
+//! file in Python, and the check of an instance against it.
 
 use std::path::Path;
 use terraglue_fmi::elf::section;
 use terraglue_plugin::describe::{variable_line, words};
 use terraglue_subsystem::{Capabilities, Variable};
 
-/// What a module says about itself in its section.
+/// Description of a module in its section.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Description {
     /// Name of its package.
@@ -17,7 +17,7 @@ pub struct Description {
     pub abi: String,
     /// Soil, robot, controller, law or sensor; empty: not told.
     pub kind: String,
-    /// What an instance can do, in the words of [`terraglue_plugin::describe::WORDS`]; None: not told.
+    /// Capabilities of an instance, in the words of [`terraglue_plugin::describe::WORDS`]; None: not given.
     pub can: Option<Vec<String>>,
     /// Its variables, `NAME ROLE TYPE UNIT`: a `*` in a name stands for any text, ` | ` parts units.
     pub variables: Vec<String>,
@@ -73,7 +73,7 @@ impl Description {
         !self.kind.is_empty() && self.can.is_some()
     }
 
-    /// What of it an instance contradicts: what the description says, what the instance does.
+    /// First contradiction between the description and an instance: the described and the real property.
     pub fn contradiction(
         &self,
         capabilities: Capabilities,

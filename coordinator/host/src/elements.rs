@@ -109,7 +109,7 @@ impl Elements {
         self.arrays.iter().find(|a| a.0 == id).map_or(1, |a| a.1)
     }
 
-    /// What stands at the front of `ids`, which is not empty.
+    /// Longest run at the front of `ids`, which is not empty.
     fn run(&self, ids: &[u32]) -> Run {
         let Some(front) = self.place(ids[0]) else {
             let own = ids.iter().take_while(|id| !self.has(**id));
@@ -210,7 +210,7 @@ impl Elements {
 }
 
 impl Run {
-    /// How many numbers, and how many values they stand for.
+    /// Count of the numbers, and of the values that they encode.
     fn size(&self) -> (usize, usize) {
         match self {
             Self::Own(count, values) => (*count, *values),

@@ -51,7 +51,7 @@ pub enum LoadError {
     CannotLoad {
         /// Path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
     /// A shared library that is no module.
@@ -64,7 +64,7 @@ pub enum LoadError {
     MissingSymbol {
         /// Path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
     /// Another version of the ABI, read from the section `.terraglue` without running the library.
@@ -94,7 +94,7 @@ pub enum LoadError {
     Schema {
         /// Path.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
     /// The parameters of the scenario are not acceptable.
@@ -104,7 +104,7 @@ pub enum LoadError {
         subsystem: String,
         /// Module name.
         module: String,
-        /// What it said.
+        /// Its message.
         message: String,
     },
     /// The module failed at its start.
@@ -114,7 +114,7 @@ pub enum LoadError {
         subsystem: String,
         /// Module name.
         module: String,
-        /// What it said.
+        /// Its message.
         message: String,
     },
 }

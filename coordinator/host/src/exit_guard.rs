@@ -1,14 +1,16 @@
-//! No foreign code ends the program with success: `exit(0)` inside a module or FMU is a failure of the run, and its
-//! recording is closed first.
+//! No foreign code ends the program with success: `exit(0)` and `_exit(0)` inside a module or FMU are failures of the run, and
+//! its recording is closed first.
 #![allow(unsafe_code)] // Registers a function that the C library calls at `exit`.
 
 use super::descendants;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, Once, PoisonError};
 
 static ARMED: AtomicBool = AtomicBool::new(false);
+/// The process that is guarded: what it forks ends as it likes.
+static PROCESS: AtomicU32 = AtomicU32::new(0);
 static REGISTERED: Once = Once::new();
 static EXIT_HOOKS: Mutex<BTreeMap<u64, Work>> = Mutex::new(BTreeMap::new());
 static NEXT: AtomicU64 = AtomicU64::new(0);
@@ -18,7 +20,7 @@ unsafe extern "C" {
     fn at_quick_exit(work: extern "C" fn()) -> libc::c_int;
 }
 
-/// What is done before the process ends.
+/// Work that is done before the process ends.
 type Work = Box<dyn FnOnce() + Send>;
 
 /// While this lives, an `exit` of the process is an error.
@@ -44,6 +46,7 @@ impl Drop for ExitHook {
 /// From here on until the answer is dropped an `exit` of the process is an error, with exit code 1.
 #[must_use]
 pub fn arm() -> Armed {
+    PROCESS.store(std::process::id(), Ordering::SeqCst);
     ARMED.store(true, Ordering::SeqCst);
     REGISTERED.call_once(|| {
         // SAFETY: the function takes nothing and never unwinds. Without room for it the run is merely less guarded.
@@ -70,8 +73,31 @@ pub fn leave(code: i32) -> ! {
     ARMED.store(false, Ordering::SeqCst);
     terraglue_fmi::remove_folders();
     descendants::end_all();
-    // SAFETY: a plain system call; the process ends here.
-    unsafe { libc::_exit(code) }
+    end(code)
+}
+
+/// The system call itself.
+fn end(code: i32) -> ! {
+    loop {
+        // SAFETY: a plain system call; the process ends here.
+        unsafe { libc::syscall(libc::SYS_exit_group, code) };
+    }
+}
+
+/// `_exit` in this program: a module or FMU that calls it finds this one first where the program exports its name, and ends the
+/// run as an error instead of with success and without a word.
+#[unsafe(no_mangle)]
+pub extern "C" fn _exit(code: libc::c_int) -> ! {
+    if ARMED.load(Ordering::SeqCst) && PROCESS.load(Ordering::SeqCst) == std::process::id() {
+        at_exit();
+    }
+    end(code)
+}
+
+/// The same by its name in C.
+#[unsafe(no_mangle)]
+pub extern "C" fn _Exit(code: libc::c_int) -> ! {
+    _exit(code)
 }
 
 extern "C" fn at_exit() {
@@ -90,11 +116,9 @@ extern "C" fn at_exit() {
         descendants::end_all();
     });
     let text = b"error: a module or FMU ended the program; `isolate = true` names it\n";
-    // SAFETY: plain system calls; the process ends here.
-    unsafe {
-        if !told {
-            libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len());
-        }
-        libc::_exit(1);
+    if !told {
+        // SAFETY: a plain system call with a text that lives for ever.
+        unsafe { libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len()) };
     }
+    end(1)
 }

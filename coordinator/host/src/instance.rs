@@ -10,7 +10,7 @@ use terraglue_subsystem::{
     Kind, Law, Level, Message, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable, World,
 };
 
-/// How far a trial went.
+/// Extent of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
     /// To t + h.
@@ -42,7 +42,7 @@ pub struct Instance {
     about: Box<InstanceInfo>,
 }
 
-/// What an instance is.
+/// Properties of an instance.
 struct InstanceInfo {
     capabilities: Capabilities,
     scene: Scene,
@@ -98,7 +98,7 @@ impl Instance {
         self.watch.cost = Duration::ZERO;
     }
 
-    /// What its calls in steps took while it was watched.
+    /// Time of its calls in steps while it was watched.
     pub fn cost(&self) -> Duration {
         self.watch.cost
     }
@@ -124,7 +124,7 @@ impl Instance {
         self.kind
     }
 
-    /// What it can do.
+    /// Its capabilities.
     pub fn capabilities(&self) -> Capabilities {
         self.about.capabilities
     }
@@ -278,7 +278,7 @@ impl Instance {
         Ok(Progress::Complete)
     }
 
-    /// What a trial was that had ports or did not go as it should.
+    /// Data of a trial that had ports or failed.
     #[inline(never)]
     fn look_at(
         &self,
@@ -392,7 +392,7 @@ impl Instance {
     /// Committed values as they are.
     ///
     /// # Errors
-    /// What the subsystem answers: an unknown variable, another type.
+    /// Errors of the subsystem: an unknown variable, another type.
     #[inline]
     pub fn peek(&self, ids: &[u32], out: ValuesMut) -> terraglue_subsystem::Result {
         match self.elements() {

@@ -13,7 +13,7 @@ use terraglue_subsystem::{
 pub const KEY: &str = "law.plugin";
 /// Interpreter of a law in Python; the host puts the key `python` of the soil's table there.
 pub const INTERPRETER: &str = "law.python";
-/// Where a scenario gives the numbers of a law.
+/// Key of the numbers of a law in a scenario.
 const NUMBERS: &str = "law.parameters";
 
 /// The file of the law that a value of [`KEY`] names; as for modules, see `Library::find`.

@@ -20,6 +20,7 @@ mod error;
 pub mod exit_guard;
 mod instance;
 pub mod isolation;
+pub mod kept_file;
 pub mod law;
 mod library;
 mod probe;

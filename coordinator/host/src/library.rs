@@ -104,7 +104,7 @@ impl LoadedModule {
         matches!(self.origin, Origin::Python(_))
     }
 
-    /// Who runs it, and its file, where it is in Python.
+    /// Its interpreter and its file, if it is in Python.
     pub(super) fn python(&self) -> Option<(&Path, &Path)> {
         match &self.origin {
             Origin::Python(source) => Some((&source.interpreter, &source.path)),
@@ -143,7 +143,7 @@ impl LoadedModule {
     /// The subsystem alone, without supervision.
     ///
     /// # Errors
-    /// What the module or its law answers; a module in Python runs in a process of its own only.
+    /// Errors of the module or its law; a module in Python runs in a process of its own only.
     pub fn make(
         &self,
         config: &Config,
@@ -294,7 +294,7 @@ pub struct Library {
     advisers: Vec<(Kind, Adviser)>,
 }
 
-/// What is unlikely to be meant of a module's parameters and of the regions of its mask, under a gravity (m/s²).
+/// Advice on unlikely parameters of a module and of the regions of its mask, under a gravity (m/s²).
 pub type Adviser = fn(&Config, &[(String, Map<String, Value>)], f64) -> Vec<Advice>;
 
 /// Makes a subsystem of the FMU at a path with the keys of its table; errors at its end go into the last argument.
@@ -335,7 +335,7 @@ impl Library {
         of_kind.flat_map(|(_, adviser)| adviser(config, regions, gravity)).collect()
     }
 
-    /// What makes subsystems of FMUs.
+    /// Factory of subsystems from FMUs.
     ///
     /// # Errors
     /// The program has none.
@@ -405,7 +405,7 @@ pub struct ListedModule {
     pub name: String,
     /// File.
     pub path: PathBuf,
-    /// What its section says; None: it has none.
+    /// Description in its section; None: it has none.
     pub description: Option<Description>,
     /// Why it would be refused; None: it can be loaded, as far as its bytes say.
     pub refused: Option<LoadError>,
@@ -446,7 +446,7 @@ pub fn listed_file(path: &Path) -> std::result::Result<ListedModule, LoadError> 
     })
 }
 
-/// What a file says about itself, without running it.
+/// Description of a file, without running it.
 pub fn described(path: &Path) -> Option<Description> {
     if python::is_python(path) {
         return PythonFile::read(path).ok().map(|f| f.description);

@@ -11,7 +11,7 @@ use terraglue_plugin::abi::*;
 use terraglue_plugin::{ForeignModule, ForeignSubsystem};
 use terraglue_subsystem::Config;
 
-/// What the table of a module says before anything is made.
+/// Facts of the table of a module before anything is made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TableFacts {
     /// Its `size`, bytes.

@@ -1,5 +1,5 @@
-//! What a library can change in the process that loads it: floating-point mode, signals, locale, folder, environment,
-//! threads, files, memory.
+//! State that a library can change in the process that loads it: floating-point mode, signals, locale, folder,
+//! environment, threads, files, memory.
 #![allow(unsafe_code)] // The registers of the processor and the C library are asked.
 
 use std::fs;
@@ -19,7 +19,7 @@ pub struct Process {
     pub environment: String,
     /// Names of the threads.
     pub threads: String,
-    /// What the open file descriptors refer to.
+    /// Targets of the open file descriptors.
     pub files: String,
 }
 
@@ -46,7 +46,7 @@ impl Process {
     }
 }
 
-/// What the entries of a folder say, sorted; the folder itself, open for reading, is left out.
+/// Descriptions of the entries of a folder, sorted; the folder itself, open for reading, is left out.
 fn entries(folder: &str, say: impl Fn(&std::path::Path) -> Option<String>) -> String {
     let all = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut told: Vec<String> =

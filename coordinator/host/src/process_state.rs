@@ -1,5 +1,5 @@
-//! What the program itself relies on in its process, and sets back where foreign code has changed it: the working folder,
-//! the mask for new files, the locale, the signals that end a run.
+//! State of the process on which the program itself relies, and that it resets if foreign code has changed it: the
+//! working folder, the mask for new files, the locale, the signals that end a run.
 #![allow(unsafe_code)] // The C library is asked and told.
 
 use std::ffi::{CStr, CString};

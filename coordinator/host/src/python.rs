@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use terraglue_subsystem::{Kind, Parameter, Schema};
 
-/// What a file says about itself.
+/// Description of a file.
 #[derive(Clone, Debug)]
 pub(super) struct PythonFile {
     pub schema: Schema,

@@ -1,4 +1,4 @@
-//! Where modules are looked for.
+//! Search path of modules.
 
 use super::python;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What an instance is offered: log, threads, cancel flag, seed, folder, gravity, terrain.
+//! Services for an instance: log, threads, cancel flag, seed, folder, gravity, terrain.
 
 use super::{Isolation, Workers};
 use std::path::{Path, PathBuf};
@@ -40,9 +40,9 @@ pub struct HostServices {
     pub workers: Arc<Workers>,
     /// Set by the user's interrupt.
     pub cancel: Arc<AtomicBool>,
-    /// Where log lines go; None: to the crate `log` with target `terraglue::module`.
+    /// Destination of log lines; None: the crate `log` with target `terraglue::module`.
     pub log: Option<LogSink>,
-    /// What went wrong while instances were ended, after the last step.
+    /// Errors of instances at their end, after the last step.
     pub teardown_errors: TeardownErrors,
     /// Numbered states that `save_state` must keep.
     pub slots: u32,

@@ -1,5 +1,5 @@
-//! What is known of a subsystem while code of it is called: its names, the time, and whether it has failed for good. Failures get
-//! name, function and time here.
+//! Supervision of a subsystem while code of it is called: its names, the time, and whether it has failed for good.
+//! Failures get name, function and time here.
 
 use super::crash::{self, Names};
 use std::cell::Cell;
@@ -43,7 +43,7 @@ impl Supervision {
         }
     }
 
-    /// What a function answered in place of doing its work; after a fatal failure it is never called again.
+    /// Error of a function; after a fatal failure the function is never called again.
     #[cold]
     pub fn failed(&self, function: &'static str, failure: Failure) -> Error {
         let text = match failure {

@@ -1,12 +1,12 @@
 //! `variables.csv`, all scalar variables over time, and `timing.csv`, what a clock measured.
 
-use crate::kept_file::KeptFile;
 use crate::layout::{TIMING, VARIABLES, at, other_at};
 use crate::snapshot::{ScalarKind, Snapshot};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::{Error, Result};
+use terraglue_host::kept_file::KeptFile;
 
 /// Writes `t_s,robot.LF_j2.angle,…`, one row per recorded communication point.
 pub(crate) struct VariablesCsv {

@@ -3,10 +3,10 @@
 
 use crate::ground_grid::{GroundGrid, Rectangle};
 use crate::point_cloud::Points;
-use crate::report::colour_map::Palette;
 use foxglove::messages::PointCloud;
 use terraglue_diagnostics::error::Result;
 use terraglue_engine::observer::SubsystemView;
+use terraglue_page::colour_map::Palette;
 use terraglue_subsystem::{FieldInfo, Pose};
 
 /// No more tiles than viewers list well.

@@ -64,7 +64,7 @@ where
 }
 
 /// Simulated time in nanoseconds, the time stamp of every message.
-pub(crate) fn nanoseconds(t_s: f64) -> u64 {
+pub fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round().max(0.0) as u64
 }
 

@@ -28,6 +28,8 @@
 struct Readme;
 
 mod body_track;
+mod chunk_file;
+mod column_reader;
 mod columns;
 mod csv;
 mod descriptor;
@@ -41,7 +43,6 @@ mod ground_points;
 mod inputs;
 mod joint_message;
 mod keep;
-mod kept_file;
 mod layout;
 mod mcap_writer;
 mod mend;
@@ -62,6 +63,7 @@ mod stream_topics;
 mod summary;
 mod summary_observer;
 mod table;
+mod tap;
 mod topics;
 mod trace;
 mod viewer_layout;
@@ -73,16 +75,17 @@ pub mod report;
 #[path = "../tests/unit/mod.rs"]
 mod tests;
 
+pub use chunk_file::{ChunkFile, Stored};
+pub use column_reader::ColumnReader;
 pub use csv::{TimingRow, write_timing};
 pub use energies::Energies;
 pub use exchange::write_exchange;
 pub use inputs::fingerprints;
-pub use kept_file::KeptFile;
 pub use layout::{CHECKPOINT, FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
-pub use layout::{at, other_at};
+pub use layout::{at, nanoseconds, other_at};
 pub use mend::{has_end, mend};
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
-pub use reader::{GroundRecord, Header, PoseSeries, Recording};
+pub use reader::{GroundRecord, Header, PoseSeries, Recording, ground_cloud, ground_grid};
 pub use recorder::{Recorder, RecorderOptions, RecorderState};
 pub use solids::Solid;
 pub use summary::{
@@ -90,4 +93,5 @@ pub use summary::{
 };
 pub use summary_observer::SummaryObserver;
 pub use table::Table;
+pub use tap::{Tap, TopicInfo};
 pub use trace::Trace;

@@ -8,13 +8,13 @@ use crate::force_message::{DRAWN_EVERY_S, Forces};
 use crate::ground_grid::{GroundGrid, Rectangle};
 use crate::ground_points::GroundPoints;
 use crate::joint_message::Joints;
-use crate::kept_file::KeptFile;
 use crate::layout::{RECORDING, at, nanoseconds, other_at, timestamp};
 use crate::messages::WindowRecord;
 use crate::overlays::{self, Overlays};
 use crate::scene_message::{bodies, frame_id, pose, quaternion, scene, vector};
 use crate::selection::Precision;
 use crate::snapshot::{Snapshot, failed};
+use crate::tap::{Tap, TopicInfo};
 use crate::topics::{self, Topic};
 use crate::visibility::Visibility;
 use crate::{energy_message, gluing_message, point_cloud, stream_topics};
@@ -31,6 +31,7 @@ use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_engine::observer::{Event, View};
 use terraglue_gluing::StepReport;
+use terraglue_host::kept_file::KeptFile;
 use terraglue_numerics::rotation;
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::Pose;
@@ -123,6 +124,10 @@ pub(crate) struct McapWriter {
     window: WindowRecord,
     /// The messages behind what is kept, where checkpoints ask for them.
     pending: Option<Vec<Pending>>,
+    /// All topics so far, in the order of their channels.
+    announced: Vec<TopicInfo>,
+    /// Who else gets the messages.
+    tap: Option<Box<dyn Tap>>,
 }
 
 impl McapWriter {
@@ -167,14 +172,30 @@ impl McapWriter {
             packed: Vec::new(),
             window: WindowRecord::default(),
             pending: None,
+            announced: Vec::new(),
+            tap: None,
         };
         writer.channels.events = writer.add(topics::of::<Log>("/events"))?;
         Ok(writer)
     }
 
     fn add(&mut self, topic: Topic) -> Result<u16> {
+        let info = TopicInfo::of(&topic);
         let channel = self.sink.topic(topic);
-        self.checked(channel)
+        let channel = self.checked(channel)?;
+        let info = TopicInfo { channel, ..info };
+        self.tap.iter_mut().for_each(|tap| tap.announced(&info));
+        self.announced.push(info);
+        Ok(channel)
+    }
+
+    /// Gives all topics so far, the messages of the open chunk where they are kept, and everything that comes to `tap`, too.
+    pub fn set_tap(&mut self, mut tap: Box<dyn Tap>) {
+        self.announced.iter().for_each(|info| tap.announced(info));
+        for pending in self.pending.iter().flatten() {
+            tap.message(&pending.header(), pending.bytes());
+        }
+        self.tap = Some(tap);
     }
 
     /// Writes the messages of all streams since the step before; called for every step.
@@ -496,6 +517,9 @@ impl McapWriter {
         if let Some(pending) = &mut self.pending {
             pending.push(Pending::of(&header, &self.message));
         }
+        if let Some(tap) = &mut self.tap {
+            tap.message(&header, &self.message);
+        }
         let written = self.sink.write(&header, &mut self.message);
         self.checked(written)
     }
@@ -505,6 +529,7 @@ impl McapWriter {
         let flushed = self.sink.flush(t_s);
         self.checked(flushed)?;
         self.pending.iter_mut().for_each(Vec::clear);
+        self.tap.iter_mut().for_each(|tap| tap.flushed());
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use crate::records::{Piece, Records};
 use crate::solids::{self, Solid};
 use crate::table::Table;
 use crate::topics::{COLUMNS, STREAM, SUBSYSTEM};
-use foxglove::messages::{FrameTransforms, Grid, Log, PointCloud, SceneUpdate};
+use foxglove::messages::{FrameTransforms, Grid, Log, PointCloud, SceneEntity, SceneUpdate};
 use prost::Message;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,6 +31,10 @@ pub struct Recording {
     pub first_frame: Option<String>,
     /// Shapes of every body in its frame, by frame.
     pub solids: BTreeMap<String, Vec<Solid>>,
+    /// The same shapes as they were written, by frame.
+    pub(crate) entities: BTreeMap<String, SceneEntity>,
+    /// Length of a force in what is recorded for viewers, m/N.
+    pub(crate) metres_per_newton: Option<f64>,
     /// How the steps were glued.
     pub gluing: Vec<GluingRecord>,
     /// Energies, J: `kinetic`, …, and `<subsystem>.kinetic`, ….
@@ -41,6 +45,10 @@ pub struct Recording {
     pub initial_ground: Option<GroundRecord>,
     /// The ground at the end, or where the recording ends.
     pub final_ground: Option<GroundRecord>,
+    /// What became of it in between.
+    pub(crate) ground_changes: Vec<GroundChange>,
+    /// Matches of local tree maps with global ones, by stream.
+    pub(crate) tree_matches: BTreeMap<String, Vec<TreeMatch>>,
     /// Whether the file has its footer; otherwise it was cut off.
     pub complete: bool,
     /// Parts that are damaged and left out.
@@ -151,21 +159,66 @@ pub struct GroundRecord {
     pub sinkage: Vec<f32>,
 }
 
+/// Schema of the messages that tell of a [`TreeMatch`].
+const TREE_MATCH: &str = "terraglue.TreeMatch";
+
+/// A local tree map on a global one, in the frame of the latter.
+#[derive(Clone, Debug, Default, PartialEq, serde::Deserialize)]
+#[serde(default)]
+pub(crate) struct TreeMatch {
+    /// Pose of the machine: x, y, m, and yaw, rad.
+    pub pose: Option<[f64; 3]>,
+    /// Half axes of one deviation, m, and the direction of the longer one, rad.
+    pub ellipse: [f64; 3],
+    /// Trees of the local map, m.
+    pub local: Vec<[f64; 2]>,
+    /// Trees of the global map around, m.
+    pub global: Vec<[f64; 2]>,
+    /// Local trees that were matched, and their partners, m.
+    pub match_from: Vec<[f64; 2]>,
+    /// See there.
+    pub match_to: Vec<[f64; 2]>,
+}
+
+/// Nodes that got another height.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GroundChange {
+    /// Simulated time, s.
+    pub t_s: f64,
+    /// Number of the node, its height before and after, m.
+    pub nodes: Vec<(u32, f32, f32)>,
+}
+
 impl GroundRecord {
-    /// Puts the nodes of a tile in.
-    fn patch(&mut self, cloud: &PointCloud, t_s: f64) {
+    /// Puts the nodes of a tile in; says what changed.
+    fn patch(&mut self, cloud: &PointCloud, t_s: f64) -> GroundChange {
+        let mut nodes = Vec::new();
         for ([x, y, z], sinkage) in point_cloud::unpack(cloud) {
             let i = ((x - self.origin[0]) / self.spacing).round();
             let j = ((y - self.origin[1]) / self.spacing).round();
             let inside = i >= 0.0 && j >= 0.0 && i < self.size[0] as f64 && j < self.size[1] as f64;
             let node = j.max(0.0) as usize * self.size[0] + i.max(0.0) as usize;
             if let (true, Some(height)) = (inside, self.height.get_mut(node)) {
-                *height = z as f32;
+                let before = std::mem::replace(height, z as f32);
                 self.sinkage[node] = sinkage;
+                if before != *height {
+                    nodes.push((node as u32, before, *height));
+                }
             }
         }
         self.t_s = t_s;
+        GroundChange { t_s, nodes }
     }
+}
+
+/// A message of `/ground`; none where it is damaged.
+pub fn ground_grid(data: &[u8]) -> Option<GroundRecord> {
+    ground(data, 0.0)
+}
+
+/// Places (x, y, z, m) and sinkages (m) of the nodes in a message of a tile of ground, `/ground/<i>_<j>`; none where it is damaged.
+pub fn ground_cloud(data: &[u8]) -> Option<Vec<([f64; 3], f32)>> {
+    PointCloud::decode(data).ok().map(|cloud| point_cloud::unpack(&cloud))
 }
 
 fn ground(data: &[u8], t_s: f64) -> Option<GroundRecord> {
@@ -231,7 +284,13 @@ impl Recording {
         let t_s = message.log_time as f64 / 1e9;
         let data = &message.data[..];
         // what a module gives in an encoding of its own says nothing of the run
-        if message.channel.metadata.contains_key(STREAM) {
+        if let Some(stream) = message.channel.metadata.get(STREAM) {
+            let schema = message.channel.schema.as_ref().map(|s| s.name.as_str());
+            if schema == Some(TREE_MATCH)
+                && let Ok(told) = serde_json::from_slice(data)
+            {
+                self.tree_matches.entry(stream.clone()).or_default().push(told);
+            }
             return;
         }
         self.outdated |= message.channel.message_encoding == "json";
@@ -242,6 +301,10 @@ impl Recording {
             "/gluing" => self.gluing.extend(StepMessage::decode(data).ok().map(GluingRecord::from)),
             "/events" => self.events.extend(Log::decode(data).ok().map(|e| Event { t_s, what: e.message })),
             "/scene" => self.take_scene(data),
+            "/contact_forces" if self.metres_per_newton.is_none() => {
+                let scale = message.channel.metadata.get("metres_per_newton");
+                self.metres_per_newton = scale.and_then(|scale| scale.parse().ok());
+            }
             topic if topic.starts_with("/ground/") => self.take_tile(data, t_s),
             _ => self.take_numbers(message, t_s, state),
         }
@@ -304,6 +367,7 @@ impl Recording {
     fn take_scene(&mut self, data: &[u8]) {
         let Ok(scene) = SceneUpdate::decode(data) else { return };
         self.solids.extend(scene.entities.iter().map(|e| (e.frame_id.clone(), solids::solids(e))));
+        self.entities.extend(scene.entities.into_iter().map(|e| (e.frame_id.clone(), e)));
     }
 
     fn take_ground(&mut self, data: &[u8], t_s: f64) {
@@ -316,7 +380,7 @@ impl Recording {
         // The tiles of the start say less than the grid that was written with them.
         let Some(ground) = self.final_ground.as_mut().filter(|_| t_s > 0.0) else { return };
         if let Ok(cloud) = PointCloud::decode(data) {
-            ground.patch(&cloud, t_s);
+            self.ground_changes.push(ground.patch(&cloud, t_s));
         }
     }
 

@@ -8,6 +8,7 @@ use crate::snapshot::Snapshot;
 use crate::space::{Reserve, explain};
 use crate::summary::{Status, Summary};
 use crate::summary_observer::SummaryObserver;
+use crate::tap::Tap;
 use crate::{selection, viewer_layout};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -174,6 +175,11 @@ impl Recorder {
     /// Says of a full disk up to when the run is kept.
     fn explained(&self, error: Error) -> Error {
         explain(error, self.mcap.kept_s())
+    }
+
+    /// Gives all topics, and every message from the open chunk on, to `tap`, too.
+    pub fn set_tap(&mut self, tap: Box<dyn Tap>) {
+        self.mcap.set_tap(tap);
     }
 
     /// The figures so far.

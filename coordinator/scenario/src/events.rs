@@ -3,7 +3,8 @@
 use super::choices::StrategyKind;
 use super::keys::{self, Table};
 use super::model::{
-    Comparison, Connection, Entry, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec, Trigger,
+    Comparison, Connection, ConnectionOrder, Entry, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec,
+    Trigger,
 };
 use super::node::{Node, Raw};
 use super::section::Section;
@@ -25,12 +26,23 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             let message = format!("`to` has {stars_to} `*`, `from` only {stars_from} to fill them");
             return Err(s.error("to", message, None));
         }
+        let extrapolate = s.text("extrapolate") == "linear";
+        if extrapolate && s.text("order") == "iterate" {
+            let message = "`extrapolate = \"linear\"` beside `order = \"iterate\"`, which finds the values of the step itself";
+            return Err(s.error("extrapolate", message.into(), Some("leave one of them out".into())));
+        }
         Ok(Connection {
+            extrapolate,
             from: s.text("from"),
             to: s.text("to"),
             factor: s.number("factor"),
             offset: s.number("offset"),
             convert: s.value("convert") != Value::Bool(false),
+            order: match s.text("order").as_str() {
+                "jacobi" => ConnectionOrder::Jacobi,
+                "iterate" => ConnectionOrder::Iterate,
+                _ => ConnectionOrder::Structure,
+            },
             map: table(s)?,
             entry,
         })
@@ -68,6 +80,10 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             let message = "a damper stands beside the spring of a joint: give compliance_m_n too".into();
             return Err(s.error("damping_n_s_m", message, None));
         }
+        if s.number("ramp_s") > 0.0 && (contact || s.number("compliance_m_n") > 0.0) {
+            let message = "`ramp_s` is of joints without compliance".into();
+            return Err(s.error("ramp_s", message, Some("leave it out".into())));
+        }
         let normal: [f64; 3] = s.numbers("normal");
         if contact && normal.iter().map(|n| n * n).sum::<f64>() < 1e-12 {
             let message = "a normal of no length points nowhere".into();
@@ -91,6 +107,7 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             normal,
             compliance: s.number("compliance_m_n"),
             damping: s.number("damping_n_s_m"),
+            ramp_s: s.number("ramp_s"),
             t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),
             mu,
             strategy: s.optional_text("strategy").and_then(|name| StrategyKind::named(&name)),

@@ -85,12 +85,30 @@ pub const STRATEGIES: &[&str] = StrategyKind::NAMES;
 pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff", "png"];
 /// Kinds of terrain that are made, not read.
 const MADE: &[&str] = &["flat", "slope", "undulating", "crater"];
+/// Colours of the ground on a page.
+const GROUND_COLOURS: &[&str] = &["plain", "height", "sinkage", "slope"];
+/// Cameras of a page.
+pub const CAMERAS: &[&str] = &["follow", "side", "top", "front", "orbit"];
+/// Layers of a page.
+pub const LAYERS: &[&str] = &["forces", "torques", "centre", "support", "overlays", "hits", "ghost", "grid"];
 /// Kinds of terrain that come from a file.
 pub const READ: &[&str] = &["esri-ascii", "geotiff", "png"];
 
 /// All reserved tables in the order of the documentation.
 pub fn tables() -> Vec<Table> {
-    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), glue(), event(), fault()]
+    vec![
+        time(),
+        world(),
+        terrain(),
+        gluing(),
+        recording(),
+        report(),
+        page(),
+        connect(),
+        glue(),
+        event(),
+        fault(),
+    ]
 }
 
 /// The reserved table of that name.
@@ -104,7 +122,7 @@ fn of(name: &'static str, help: &'static str, keys: Vec<Key>) -> Table {
 
 fn time() -> Table {
     let keys = vec![
-        number("step_s", "s", 0.001, "communication step h").positive().within_max(1.0).into(),
+        number("step_s", "s", 0.001, "communication step h").positive().within_max(1e6).into(),
         required("duration_s", "s", "simulated time; a multiple of `step_s`").positive().into(),
         number("settle_s", "s", 0.0, "time before the start in which what touches the ground comes to rest")
             .within(0.0, 1e3)
@@ -305,6 +323,20 @@ fn report() -> Table {
     of("report", "Body and speed of the summary and the report.", keys)
 }
 
+fn page() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
+    let texts = |name, help| Key::from(text(name, help)).form(Form::Texts);
+    let keys = vec![
+        text("camera", "from where: follow, side, top, front, orbit; or with turn and height, rad, and distance, m: `side,-1.57,0.12,3`")
+            .into(),
+        text("ground", "colours of the ground; sinkage where absent").choices(GROUND_COLOURS).into(),
+        texts("layers", "what is shown beside bodies and ground; contact forces, overlays, sensors and grid where absent"),
+        texts("plots", "plots of the oscilloscope, each of variables with commas between: `robot.LF_j2.torque,robot.LM_j2.torque`; `a@b` is a over b"),
+        text("select", "`subsystem.part` or `subsystem.variable` whose properties are shown").into(),
+    ];
+    of("page", "How the page of a run, its report, pictures and videos look at first.", keys)
+}
+
 fn connect() -> Table {
     let text = |name, help| Parameter::of(name, ParameterType::Text, help);
     let keys = vec![
@@ -314,6 +346,14 @@ fn connect() -> Table {
         number("offset", "", 0.0, "see `factor`").into(),
         Parameter::of("convert", ParameterType::Bool, "false: units are neither converted nor compared")
             .or(true)
+            .into(),
+        text("order", "structure: FMUs whose outputs depend on this input are stepped after the FMU that feeds it, so that the value is not late; jacobi: the input is the output of the start of the step; iterate: the FMUs of a loop repeat the step until the value at its end is the one that it was made with")
+            .or("structure")
+            .choices(&["structure", "jacobi", "iterate"])
+            .into(),
+        text("extrapolate", "where the input is read at the start of a step: constant: held as it was read; linear: it follows the line through the last two values, with the mean over the step of the target, or the value at its end where outputs follow inputs at once")
+            .or("constant")
+            .choices(&["constant", "linear"])
             .into(),
         Key::from(
             Parameter::of(
@@ -363,6 +403,9 @@ fn glue() -> Table {
             .within(0.0, f64::INFINITY)
             .into(),
         number("mu", "", 0.0, "Coulomb coefficient of a contact; 0: the normal force only")
+            .within(0.0, f64::INFINITY)
+            .into(),
+        number("ramp_s", "s", 0.0, "time in which a joint without compliance closes the gap between its points at the start; 0: there may be none")
             .within(0.0, f64::INFINITY)
             .into(),
         text("strategy", "how all that is connected with this glue is glued; `gluing.strategy` where absent")

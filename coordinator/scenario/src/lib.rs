@@ -22,6 +22,7 @@ mod mask;
 mod model;
 mod module_kind;
 mod node;
+mod page;
 mod parameters;
 pub mod plausible;
 pub mod schema;

@@ -9,7 +9,7 @@ use super::node::{Node, Place, Raw};
 use super::section::Section;
 use super::set::{Edit, edit_text};
 use super::source::Source;
-use super::{subsystems, terrain};
+use super::{page, subsystems, terrain};
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_diagnostics::LARGEST_WHOLE;
@@ -97,6 +97,7 @@ impl Scenario {
             })
         })?;
         let report = with_section(&source, "report", |s| read_report(s, &names))?;
+        let page = with_section(&source, "page", |s| page::read(s, &names))?;
         let connections = connections(&source, &names)?;
         let glue = glue(&source, &names)?;
         let events = events(&source, &names)?;
@@ -111,6 +112,7 @@ impl Scenario {
             gluing,
             recording,
             report,
+            page,
             subsystems: specs,
             connections,
             glue,

@@ -34,6 +34,8 @@ pub struct Scenario {
     pub recording: RecordingSpec,
     /// `[report]`.
     pub report: ReportSpec,
+    /// `[page]`.
+    pub page: PageSpec,
     /// Subsystems in the order of their names.
     pub subsystems: Vec<SubsystemSpec>,
     /// `[[connect]]`.
@@ -215,6 +217,47 @@ pub struct ReportSpec {
     pub joint: Option<String>,
 }
 
+/// `[page]`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct PageSpec {
+    /// From where: a name, or a name with turn and height, rad, and distance, m.
+    pub camera: Option<String>,
+    /// Colours of the ground.
+    pub ground: Option<String>,
+    /// Layers that are on; the usual ones where absent.
+    pub layers: Option<Vec<String>>,
+    /// Plots, each of variables with commas between; what stands along its axis follows an `@`.
+    pub plots: Vec<String>,
+    /// `subsystem.part` or `subsystem.variable` that is selected.
+    pub select: Option<String>,
+}
+
+impl PageSpec {
+    /// All variables of a plot.
+    pub fn variables(plot: &str) -> impl Iterator<Item = &str> {
+        plot.split([',', '@']).map(str::trim)
+    }
+
+    /// What the text of a scenario says, as the page reads it; none where it says nothing.
+    pub fn of_text(text: &str) -> Option<Value> {
+        Scenario::parse(text, "scenario.toml", &[]).ok()?.page.to_json()
+    }
+
+    /// As the page reads it; none where nothing was said.
+    pub fn to_json(&self) -> Option<Value> {
+        let all = [
+            ("camera", self.camera.clone().map(Value::from)),
+            ("ground", self.ground.clone().map(Value::from)),
+            ("layers", self.layers.clone().map(Value::from)),
+            ("plots", (!self.plots.is_empty()).then(|| self.plots.join(";").into())),
+            ("select", self.select.clone().map(Value::from)),
+        ];
+        let said: Map<String, Value> =
+            all.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
+        (!said.is_empty()).then_some(Value::Object(said))
+    }
+}
+
 /// A subsystem's table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SubsystemSpec {
@@ -262,6 +305,18 @@ pub struct Entry {
     pub number: usize,
 }
 
+/// When within a step a connection passes its value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ConnectionOrder {
+    /// FMUs are stepped in the order of their structure where that avoids a delay.
+    #[default]
+    Structure,
+    /// At the start of the step.
+    Jacobi,
+    /// The step is repeated until the value at its end is the one that it was made with.
+    Iterate,
+}
+
 /// `[[connect]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
@@ -275,6 +330,10 @@ pub struct Connection {
     pub offset: f64,
     /// Whether units are compared and converted.
     pub convert: bool,
+    /// When within a step its value is passed.
+    pub order: ConnectionOrder,
+    /// Whether the input follows the line through the last two values; else it is held.
+    pub extrapolate: bool,
     /// What each value becomes, of truth values, whole numbers and enumerations; empty: what it is.
     pub map: Vec<(String, Value)>,
     /// Where it stands.
@@ -321,6 +380,8 @@ pub struct GlueSpec {
     pub compliance: f64,
     /// Damping of the glue beside its spring, N s/m.
     pub damping: f64,
+    /// Time in which the gap at the start is closed, s; 0: there may be none.
+    pub ramp_s: f64,
     /// Largest normal force, N.
     pub t_max: f64,
     /// Coulomb coefficient.

@@ -19,21 +19,8 @@ impl Bounds {
 
     /// Of a geometry in its own frame.
     pub fn of_geometry(geometry: &Geometry) -> Self {
-        let half = match geometry {
-            Geometry::Sphere { radius } => [*radius; 3],
-            Geometry::Box { half_extents } => *half_extents,
-            Geometry::Capsule { half_length, radius } => [*radius, *radius, half_length + radius],
-            Geometry::Cylinder { half_length, radius } => [*radius, *radius, *half_length],
-            Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
-                let radius = radius_bottom.max(*radius_top);
-                [radius, radius, *half_length]
-            }
-            Geometry::Ellipsoid { semi_axes } => *semi_axes,
-            Geometry::ConvexMesh { points, .. } | Geometry::Mesh { points, .. } => {
-                return Self::of_points(points);
-            }
-        };
-        Self { low: half.map(|h| -h), high: half }
+        let [low, high] = geometry.extent();
+        Self { low, high }
     }
 
     pub fn with(&self, p: [f64; 3]) -> Self {

@@ -8,7 +8,7 @@ use crate::floating_point::Keep;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::error::Error as _;
 use std::mem::ManuallyDrop;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Library of an FMU in this process; unloaded when dropped, unless threads may still run in it.
 #[derive(Debug)]
@@ -113,7 +113,7 @@ fn inspect(path: &Path) -> std::result::Result<(), String> {
     }
 }
 
-/// Opens a library. Some FMUs forget to link the mathematics library: they get a second try with it.
+/// Opens a library. Some FMUs forget to link the mathematics library, or that of Python: they get a second try with it.
 fn open(path: &Path) -> std::result::Result<Library, String> {
     // SAFETY: the user asked for this FMU; its constructors run.
     let once = || unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
@@ -121,15 +121,26 @@ fn open(path: &Path) -> std::result::Result<Library, String> {
         Ok(library) => return Ok(library),
         Err(e) => cause(&e),
     };
-    if !first.contains("undefined symbol") {
-        return Err(first);
-    }
-    // SAFETY: the mathematics library of the system.
-    match unsafe { Library::open(Some("libm.so.6"), RTLD_NOW | RTLD_GLOBAL) } {
-        Ok(mathematics) => std::mem::forget(mathematics),
-        Err(_) => return Err(first),
+    let Some((_, symbol)) = first.split_once("undefined symbol: ") else { return Err(first) };
+    let forgotten = match symbol.starts_with("Py") || symbol.starts_with("_Py") {
+        true => python(),
+        false => Some("libm.so.6".into()),
+    };
+    // SAFETY: a library of the system.
+    match forgotten.map(|path| unsafe { Library::open(Some(path), RTLD_NOW | RTLD_GLOBAL) }) {
+        Some(Ok(library)) => std::mem::forget(library),
+        _ => return Err(first),
     }
     once().map_err(|e| cause(&e))
+}
+
+/// The library of the interpreter `python3`, where it has one.
+fn python() -> Option<PathBuf> {
+    const ASK: &str =
+        "import sysconfig as s; print(s.get_config_var('LIBDIR'), s.get_config_var('INSTSONAME'), sep='/')";
+    let told = std::process::Command::new("python3").args(["-c", ASK]).output().ok()?;
+    let path = PathBuf::from(String::from_utf8(told.stdout).ok()?.trim());
+    (told.status.success() && path.to_string_lossy().contains(".so")).then_some(path)
 }
 
 /// The system's own words: the top message of libloading hides them.

@@ -142,6 +142,16 @@ fn number<const N: usize>(bytes: &[u8], at: usize) -> Option<usize> {
     usize::try_from(value).ok()
 }
 
+/// The newest version of glibc that a library asks for, as `2.34`; none where it asks for none, as with another C library.
+pub fn needed_glibc(bytes: &[u8]) -> Option<String> {
+    let names = section(bytes, ".dynstr")?.split(|byte| *byte == 0);
+    let minor = |name: &[u8]| -> Option<u32> {
+        let version = std::str::from_utf8(name).ok()?.strip_prefix("GLIBC_2.")?;
+        version.split('.').next()?.parse().ok()
+    };
+    names.filter_map(minor).max().map(|minor| format!("2.{minor}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -25,10 +25,12 @@ pub mod floating_point;
 mod fmu;
 mod folder;
 pub mod instance;
+pub mod overview;
+pub mod references;
 pub mod ssp;
 
 pub use archive::Limits;
-pub use binary::{library_entry, platforms};
+pub use binary::{library_entry, platform, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
 pub use fmu::Fmu;

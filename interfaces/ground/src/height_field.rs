@@ -48,7 +48,7 @@ impl From<HeightError> for terraglue_subsystem::Error {
     }
 }
 
-/// Where the heights of a tile are.
+/// Storage of the heights of a tile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Heights {
     Uniform(i32),
@@ -141,7 +141,7 @@ impl HeightField {
         Heights::Stored(slot)
     }
 
-    /// Where the nodes lie.
+    /// Lattice of the nodes.
     #[inline]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice

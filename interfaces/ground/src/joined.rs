@@ -65,7 +65,7 @@ pub fn nodes_below_parts<'a, S: Surface + ?Sized>(
     }
 }
 
-/// What a cell lies below.
+/// Lower boundary of a cell.
 struct Below<'a> {
     /// Covered, m².
     area: f64,

@@ -42,7 +42,7 @@ pub use tile_map::{TileMap, TileMapSnapshot};
 
 /// Ground that can be read node by node: a [`HeightField`], a field of a soil, a terrain.
 pub trait Surface {
-    /// Where its nodes lie.
+    /// Lattice of its nodes.
     fn lattice(&self) -> &Lattice;
     /// Height of node (i, j), m. Indices outside the lattice read the nearest node of the edge.
     fn height(&self, i: i32, j: i32) -> f64;

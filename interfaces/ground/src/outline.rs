@@ -218,7 +218,7 @@ fn at_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> bool {
 pub(crate) struct Polygon {
     points: [[f64; 2]; MOST_CORNERS],
     count: usize,
-    /// How far, as a part of the way to the middle, points of the edge are drawn inwards to lie below the shape.
+    /// Share of the way to the middle by which points of the edge are drawn inwards to lie below the shape.
     inwards: f64,
 }
 

@@ -10,8 +10,7 @@ pub(crate) fn common(a: &[u32], b: &[u32]) -> usize {
     a.iter().zip(b).take_while(|(a, b)| a == b).count()
 }
 
-/// What was changed since the start: the sinkage of every touched tile. Refilled without allocation once it
-/// was large enough.
+/// Changes since the start: the sinkage of every touched tile. Refilled without allocation once it was large enough.
 #[derive(Clone, Debug, Default)]
 pub struct HeightSnapshot {
     touched: Vec<u32>,

@@ -49,7 +49,7 @@ impl<T: Copy> TileMap<T> {
         Self { lattice, tiles, generations, touched, pool, default, writes: 0, identity: Identity::default() }
     }
 
-    /// Where the nodes lie.
+    /// Lattice of the nodes.
     #[inline]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice

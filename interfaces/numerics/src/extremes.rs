@@ -23,7 +23,7 @@ pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     numbers.into_iter().reduce(larger).unwrap_or(f64::NAN)
 }
 
-/// What does not even compare with itself.
+/// Whether a value is unequal to itself.
 fn is_nan<T: PartialOrd>(a: &T) -> bool {
     a.partial_cmp(a).is_none()
 }

@@ -1,4 +1,4 @@
-//! Numerics that modules and coordinator share: rotations, dense linear systems, and extremes that keep NaN.
+//! Numerics that modules and coordinator share: rotations, dense linear systems, numbers drawn from a seed, and extremes that keep NaN.
 //!
 //! The only interface crate with algorithms. It touches no clock, no file and no thread.
 
@@ -11,4 +11,5 @@ pub mod dense;
 pub mod extremes;
 pub mod in_place;
 pub mod least_norm;
+pub mod random;
 pub mod rotation;

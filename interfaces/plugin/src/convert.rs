@@ -68,7 +68,7 @@ pub(crate) fn causality(number: u32) -> Option<Causality> {
     }
 }
 
-/// What a change of a variable does.
+/// Effect of a change of a variable.
 pub(crate) fn effect(number: u32) -> Option<Effect> {
     match number {
         TG_LIVE => Some(Effect::Live),

@@ -2,7 +2,7 @@
 
 use terraglue_subsystem::{Capabilities, LawModule, Variable};
 
-/// What an instance can do, as words.
+/// Names of the capabilities of an instance.
 pub const WORDS: [(Capabilities, &str); 13] = [
     (Capabilities::FORCE, "force"),
     (Capabilities::MOTION, "motion"),

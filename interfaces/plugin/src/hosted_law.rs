@@ -43,7 +43,7 @@ impl HostedLaw {
         self.table.open()
     }
 
-    /// What it said when it failed, once.
+    /// Message of its failure, given once.
     pub(crate) fn words(&self) -> Option<String> {
         self.inner.words.lock().unwrap_or_else(PoisonError::into_inner).take()
     }

@@ -3,7 +3,7 @@
 use crate::text::c_string;
 use std::ffi::{CString, c_char};
 
-/// What pointers of C structures point at; moved or dropped only with them.
+/// Data behind pointers of C structures; moved or dropped only with them.
 #[derive(Default)]
 pub(crate) struct Keep {
     texts: Vec<CString>,

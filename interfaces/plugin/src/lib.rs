@@ -108,7 +108,7 @@ macro_rules! export_table {
             "[TG13] a module must be built with panic = \"unwind\": aborting would end the host; take panic = \"abort\" out of the profile"
         );
 
-        /// What this library is, readable without running it.
+        /// Description of this library, readable without running it.
         #[allow(unsafe_code)]
         // SAFETY: a section of our own name; nothing else reads or writes it.
         #[unsafe(link_section = ".terraglue")]

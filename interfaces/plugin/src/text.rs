@@ -45,7 +45,7 @@ pub(crate) unsafe fn slice_mut<'a, T>(first: *mut T, count: usize) -> &'a mut [T
     unsafe { std::slice::from_raw_parts_mut(first, count) }
 }
 
-/// What a caught panic said.
+/// Message of a caught panic.
 pub(crate) fn panic_text(payload: &(dyn Any + Send)) -> String {
     let said = payload.downcast_ref::<&str>().copied();
     let said = said.or_else(|| payload.downcast_ref::<String>().map(String::as_str));

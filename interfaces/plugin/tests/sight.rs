@@ -1,4 +1,4 @@
-//! What a module sees of the world, and what it shows, is the same through the C table as in the direct call.
+//! Views of the world, streams and overlays of a module are the same through the C table as in the direct call.
 #![allow(unsafe_code, missing_docs, clippy::unwrap_used)]
 
 #[allow(dead_code)]

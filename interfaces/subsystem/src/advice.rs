@@ -1,4 +1,4 @@
-//! What a kind of module says of parameters that are accepted and yet unlikely to be meant.
+//! Advice on parameters that are accepted and yet unlikely to be meant, by kind of module.
 
 /// A warning about a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]

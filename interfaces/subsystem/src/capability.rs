@@ -1,4 +1,4 @@
-//! What a subsystem can do beyond `advance`; a strategy that lacks something is refused at load time.
+//! Abilities of a subsystem beyond `advance`; a strategy that lacks one of them is refused at load time.
 
 /// A set of capabilities; plain bits, so that it crosses the C ABI unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -31,6 +31,9 @@ impl Capabilities {
     pub const SEES: Self = Self(8192);
     /// `shape_visibility` is implemented; without it all shapes are shown and nobody asks.
     pub const HIDES: Self = Self(16384);
+    /// Outputs at the end of a step depend directly on the inputs of that step, and values of a trial can be read before it is
+    /// committed. Of FMUs; unknown to the C interface of modules.
+    pub const STEP_FEEDTHROUGH: Self = Self(1 << 31);
 
     /// All names, for messages and listings.
     pub const NAMES: [(Self, &'static str); 13] = [

@@ -1,4 +1,4 @@
-//! What a call can answer instead of success. Errors are values: no panic crosses a subsystem's border.
+//! Errors of calls. Errors are values: no panic crosses a subsystem's border.
 
 /// Why a call of a subsystem did not succeed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

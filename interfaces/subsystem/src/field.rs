@@ -1,6 +1,6 @@
 //! Fields over the ground (height, sinkage, pressure, …), shown tile by tile without a copy.
 
-/// What a field is and where its lattice lies. Nodes (i, j), 0 ≤ i < nx, at `origin + (i, j)·spacing`.
+/// Name, unit and lattice of a field. Nodes (i, j), 0 ≤ i < nx, at `origin + (i, j)·spacing`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldInfo {
     /// Name; `height` is the surface that contact detection reads.

@@ -14,7 +14,7 @@ const LARGEST_DATA: u64 = 16 << 30;
 /// Opens a regular file.
 ///
 /// # Errors
-/// What the system says, or that it is a folder, a pipe or a device.
+/// The error of the system, or that the path is a folder, a pipe or a device.
 pub fn open(path: &Path) -> Result<File> {
     // looked at before: to open a pipe waits for its other end
     let kind = std::fs::metadata(path)?.file_type();

@@ -1,4 +1,4 @@
-//! What the host offers a subsystem at `instantiate`, and for as long as it lives.
+//! Services of the host for a subsystem, from `instantiate` to its end.
 
 use crate::error::{Error, Result};
 use crate::node_law::NodeLaw;
@@ -34,7 +34,7 @@ pub trait Host: Send + Sync {
     fn seed(&self) -> u64;
     /// Folder to which relative paths of the parameters refer (that of the scenario file).
     fn folder(&self) -> &str;
-    /// How many numbered states `save_state` must keep.
+    /// Number of numbered states that `save_state` must keep.
     fn slots(&self) -> u32;
     /// Largest number of ground nodes that a step may show; a hint for what to reserve.
     fn max_nodes(&self) -> u32;
@@ -61,7 +61,7 @@ pub trait Terrain: Send + Sync {
     fn heights(&self, i0: i64, j0: i64, ni: usize, nj: usize, out: &mut [f64]) -> TerrainTile;
 }
 
-/// What [`Terrain::heights`] found.
+/// Result of [`Terrain::heights`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TerrainTile {
     /// All the same; `out` is filled all the same.

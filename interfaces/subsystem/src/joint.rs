@@ -15,11 +15,11 @@ pub struct SceneJoint {
     pub parent_from_joint: Pose,
     /// Direction of the axis in the frame of the joint, unit; zero for a kind without an axis.
     pub axis: [f64; 3],
-    /// How it moves.
+    /// Kind of its motion.
     pub kind: JointKind,
     /// Smallest and largest position, rad or m; ±∞: none.
     pub limits: [f64; 2],
-    /// Where its values are found.
+    /// Variables that hold its values.
     pub variables: JointVariables,
     /// The action that breaks it; empty: none.
     pub break_action: String,
@@ -30,7 +30,7 @@ impl SceneJoint {
     pub const WORLD: u32 = u32::MAX;
 }
 
-/// How a joint moves.
+/// Kind of motion of a joint.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
@@ -77,7 +77,7 @@ pub struct JointVariables {
     pub position: u32,
     /// Velocity, rad/s or m/s.
     pub velocity: u32,
-    /// What its motor gives, N m or N.
+    /// Torque or force of its motor, N m or N.
     pub torque: u32,
     /// The most that its motor can give, N m or N.
     pub torque_limit: u32,

@@ -1,4 +1,4 @@
-//! What everything that the coordinator steps agrees on: bodies, soils, controllers, FMUs.
+//! Interface of everything that the coordinator steps: bodies, soils, controllers, FMUs.
 //!
 //! A plugin author reads this crate and nothing else. There are two traits: [`Module`], the static side
 //! (what it is, which parameters it takes, how to make one), and [`Subsystem`], an instance.
@@ -48,10 +48,12 @@ mod port;
 mod pose;
 mod scene;
 mod schema;
+mod slots;
 mod stream;
 mod subsystem;
 mod trial;
 pub mod unit;
+mod value_table;
 mod variable;
 mod world;
 
@@ -73,8 +75,10 @@ pub use port::{Law, Node, Port, PortKind, component};
 pub use pose::{BodyState, Pose};
 pub use scene::{Geometry, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema, Usual};
+pub use slots::Slots;
 pub use stream::{Message, StreamInfo};
 pub use subsystem::{Module, Subsystem};
 pub use trial::{Batch, Estimate, Input, Level, Motion, Response, Step, flag};
+pub use value_table::ValueTable;
 pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable, element_name};
 pub use world::{BodyRef, GROUND, Ray, RayHit, RayMask, ShapeRef, World};

@@ -1,6 +1,7 @@
-//! What a shape is made of, as far as sensors see it.
+//! Materials of shapes, as far as sensors see them.
 
-/// What a surface is, as a number that crosses every border. Numbers from [`MaterialClass::FREE`] on are the modules' own.
+/// Class of a surface, a number that crosses every border. Numbers from [`MaterialClass::FREE`] on are the modules'
+/// own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct MaterialClass(pub u32);
 
@@ -42,11 +43,11 @@ impl MaterialClass {
     }
 }
 
-/// What a surface does to light.
+/// Optical properties of a surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// What it is: a [`MaterialClass`].
+    /// Its class: a [`MaterialClass`].
     pub class: u32,
     /// Part of the light that comes back, 0 … 1.
     pub reflectance: f32,

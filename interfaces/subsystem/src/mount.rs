@@ -1,4 +1,4 @@
-//! Where a sensor sits: `mount = "robot.body"` and an offset, instead of connections for seven numbers of a pose.
+//! Mounts of sensors: `mount = "robot.body"` and an offset, instead of connections for seven numbers of a pose.
 
 use crate::config::Config;
 use crate::error::{Error, Result};
@@ -153,6 +153,12 @@ impl Pose {
     /// A direction of this frame in the frame that it lies in.
     pub fn turned(&self, v: [f64; 3]) -> [f64; 3] {
         turned(self.orientation, v)
+    }
+
+    /// A point of this frame in the frame that it lies in, m.
+    pub fn point(&self, at: [f64; 3]) -> [f64; 3] {
+        let aside = self.turned(at);
+        [0, 1, 2].map(|k| self.position[k] + aside[k])
     }
 
     /// A direction of the outer frame in this one.

@@ -12,7 +12,7 @@ pub struct Overlay {
     pub frame: u32,
     /// Red, green, blue, opacity, 0 … 1.
     pub colour: [f32; 4],
-    /// What is drawn.
+    /// Its figure.
     pub figure: Figure,
 }
 
@@ -23,7 +23,7 @@ impl Overlay {
     pub const MOUNT: u32 = u32::MAX - 1;
 }
 
-/// What an overlay draws; lengths in m.
+/// Figure of an overlay; lengths in m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Figure {
     /// Lines from point to point.
@@ -56,11 +56,11 @@ pub enum Figure {
     },
     /// A text that faces whoever looks.
     Text {
-        /// Where it begins.
+        /// Position of its start.
         at: [f64; 3],
         /// Height of its letters.
         height: f64,
-        /// What it says.
+        /// Its text.
         text: String,
     },
 }

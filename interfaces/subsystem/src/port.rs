@@ -1,6 +1,6 @@
 //! A port: the place where two subsystems are glued. Plain data that crosses the C ABI unchanged.
 
-/// Where two subsystems are glued.
+/// Place where two subsystems are glued.
 ///
 /// For a contact patch the origin is the body's lowest point along −n at t, `n` points from the soil into the
 /// body, and X1 is the motion of the body within the step, measured from the origin.
@@ -41,13 +41,13 @@ pub struct Port {
     pub mask: u32,
     /// First component of this port in packed vectors.
     pub first: u32,
-    /// What this subsystem has there: index into its scene's bodies, or a cell, or a terminal.
+    /// Body of this subsystem at the port: index into its scene's bodies, or a cell, or a terminal.
     pub body: u32,
     /// Id of the scene shape on the side of the body; `u32::MAX`: none.
     pub shape: u32,
     /// First of the ground nodes below the shape: `Step::nodes[first_node..][..node_count]`.
     pub first_node: u32,
-    /// How many ground nodes lie below the shape.
+    /// Number of ground nodes below the shape.
     pub node_count: u32,
     /// Reference point, world, m; fixed during the step.
     pub origin: [f64; 3],

@@ -1,4 +1,4 @@
-//! Where something is, and how it moves.
+//! Poses and motions.
 
 /// Position and orientation: `world_from_x` or `body_from_x` as the name of the value says.
 #[repr(C)]

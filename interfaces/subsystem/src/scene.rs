@@ -1,5 +1,4 @@
-//! What can be seen and hit: bodies, the shapes that they carry and the joints between them, described once, and the
-//! state of the bodies.
+//! Scenes: bodies, the shapes that they carry and the joints between them, described once, and the state of the bodies.
 
 use crate::joint::SceneJoint;
 use crate::material::Material;
@@ -64,6 +63,28 @@ pub enum Geometry {
 }
 
 impl Geometry {
+    /// Lowest and highest corner of a box along the axes of its own frame, m; a mesh without points has none: +∞ and −∞.
+    pub fn extent(&self) -> [[f64; 3]; 2] {
+        let half = match self {
+            Self::Sphere { radius } => [*radius; 3],
+            Self::Box { half_extents } => *half_extents,
+            Self::Capsule { half_length, radius } => [*radius, *radius, half_length + radius],
+            Self::Cylinder { half_length, radius } => [*radius, *radius, *half_length],
+            Self::ConeFrustum { half_length, radius_bottom, radius_top } => {
+                let radius = radius_bottom.max(*radius_top);
+                [radius, radius, *half_length]
+            }
+            Self::Ellipsoid { semi_axes } => *semi_axes,
+            Self::ConvexMesh { points, .. } | Self::Mesh { points, .. } => {
+                let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+                return points.iter().fold(empty, |[low, high], p| {
+                    [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+                });
+            }
+        };
+        [half.map(|h| -h), half]
+    }
+
     /// Why a shape of this geometry cannot be hit; none where it can.
     pub fn cannot_collide(&self) -> Option<&'static str> {
         matches!(self, Self::Mesh { .. })
@@ -95,7 +116,7 @@ pub struct SceneShape {
     pub body_from_shape: Pose,
     /// Whether it can be hit; otherwise it is only seen.
     pub collides: bool,
-    /// What it is made of, for sensors.
+    /// Its material, for sensors.
     pub material: Material,
 }
 

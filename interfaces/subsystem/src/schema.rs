@@ -1,8 +1,8 @@
-//! What a module is and which parameters it takes; the scenario is checked against it, docs are made from it.
+//! Kind and parameters of a module; the scenario is checked against them, docs are made from them.
 
 use serde::{Deserialize, Serialize};
 
-/// What kind of subsystem a module makes.
+/// Kind of subsystem that a module makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
@@ -24,7 +24,7 @@ pub enum Kind {
 pub struct Schema {
     /// Module name, e.g. `soil-bekker`.
     pub name: String,
-    /// What it makes.
+    /// Kind of its subsystems.
     pub kind: Kind,
     /// One line for people.
     pub help: String,

@@ -10,7 +10,7 @@ pub struct StreamInfo {
     pub name: String,
     /// Name of the schema of its messages, e.g. `foxglove.PointCloud`.
     pub schema: String,
-    /// How messages are written: `protobuf`, `json`, or another name that its readers know.
+    /// Encoding of messages: `protobuf`, `json`, or another name that its readers know.
     pub encoding: String,
     /// Most messages per second, 1/s; 0: whenever something happens.
     pub rate_hz: f64,

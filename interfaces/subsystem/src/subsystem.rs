@@ -34,7 +34,7 @@ pub trait Module {
 ///
 /// Calls come from one thread at a time.
 pub trait Subsystem: Send {
-    /// What this instance can do.
+    /// Capabilities of this instance.
     fn capabilities(&self) -> Capabilities;
 
     /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
@@ -240,8 +240,8 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
-    /// What this instance shows beside its bodies, of the committed state, behind what `out` holds already. Called only when
-    /// somebody looks or a recording asks, so it may cost what it needs.
+    /// Appends overlays of the committed state, shown beside the bodies, to `out`. Called only when somebody looks or a
+    /// recording asks, so it may cost what it needs.
     fn overlays(&self, _out: &mut Vec<Overlay>) {}
 
     /// Fields over the ground. `height`, where offered, is the surface that contact detection reads.

@@ -1,4 +1,4 @@
-//! What goes into and comes out of the calls of a step: the step itself, inputs, responses, the estimate.
+//! Arguments and results of the calls of a step: the step itself, inputs, responses, the estimate.
 
 use crate::port::{Node, Port};
 
@@ -36,7 +36,7 @@ impl Step<'_> {
     }
 }
 
-/// What acts on the ports during a trial; packed.
+/// Wrenches or motions at the ports during a trial, packed.
 #[derive(Clone, Copy, Debug)]
 pub enum Input<'a> {
     /// The wrench T. For components that a constitutive law answers (shear and moments of a soil), `motion`

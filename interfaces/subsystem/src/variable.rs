@@ -20,7 +20,7 @@ pub struct Variable {
     pub value_type: ValueType,
     /// Role.
     pub causality: Causality,
-    /// What a change does.
+    /// Effect of a change.
     pub effect: Effect,
     /// Unit in SI symbols separated by spaces, e.g. `N m`, `rad/s`; empty: a pure number.
     pub unit: String,
@@ -146,7 +146,7 @@ pub enum Causality {
     Local = 3,
 }
 
-/// What a change of a variable does.
+/// Effect of a change of a variable.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {

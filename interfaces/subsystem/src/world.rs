@@ -1,4 +1,4 @@
-//! What a subsystem that sees is shown: the bodies, shapes and grounds of all others, and rays through them.
+//! Sight of a subsystem: the bodies, shapes and grounds of all others, and rays through them.
 //!
 //! # Of what time an answer is
 //! [`crate::Subsystem::observe`] comes once per step [t, t + h], after all subsystems have committed it. Everything that is asked
@@ -58,7 +58,7 @@ pub trait World {
     /// The nearest hit of every ray, each at its own time: `hits[i]` belongs to `rays[i]`. Surfaces are seen from both
     /// sides; a ray that starts inside a shape hits it from within. Rays without a direction, with a range that is not
     /// positive or with numbers that are not finite (the range may be ∞) miss.
-    /// Where the lengths differ, the rest of the longer list is left alone.
+    /// If the lengths differ, the rest of the longer list is left alone.
     fn cast_rays(&self, rays: &[Ray], mask: &RayMask, hits: &mut [RayHit]);
 
     /// Heights of the ground at points x, y of the world, m; NaN where there is none. Of several grounds the highest.
@@ -133,11 +133,11 @@ pub struct Ray {
     pub direction: [f64; 3],
     /// When it looks, s; within [`World::interval`].
     pub time: f64,
-    /// How far it looks, m; may be ∞.
+    /// Its range, m; may be ∞.
     pub range: f64,
 }
 
-/// What a ray met first.
+/// First hit of a ray.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
@@ -151,7 +151,7 @@ pub struct RayHit {
     pub body: u32,
     /// Id of the shape; [`GROUND`]: the ground.
     pub shape: u32,
-    /// What it is made of.
+    /// Material of the surface.
     pub material: Material,
 }
 
@@ -172,7 +172,7 @@ impl RayHit {
     }
 }
 
-/// What a ray or an overlap does not pass by.
+/// Filter of rays and overlaps.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RayMask {

@@ -1,9 +1,9 @@
-//! What the walker is asked to do, with what it measures.
+//! Commands of the walker, with its measurements.
 
 use crate::geometry::LEGS;
 use crate::pattern::Pattern;
 
-/// What is asked of the walker and what it measures; may change before every step.
+/// Commands and measurements of the walker; may change before every step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// Forward speed, m/s.

@@ -3,8 +3,8 @@
 //! In the air x and y follow a cycloid and z a raised cosine, so that the foot leaves and meets the ground at rest:
 //! at rest in the body frame, or, as it should be on soft ground, at rest in the world.
 //!
-//! Where the force on the foot is known, the swing ends in its last quarter as soon as the foot presses on the ground,
-//! and the foot stands at the height where it met it. A foot that presses on nothing looks further down.
+//! If the force on the foot is known, the swing ends in its last quarter as soon as the foot presses on the ground, and
+//! the foot stands at the height where it met it. A foot that presses on nothing looks further down.
 
 use std::f64::consts::TAU;
 
@@ -28,8 +28,8 @@ impl Twist {
         libm::hypot(self.speed - self.turn_rate * p[1], self.turn_rate * p[0])
     }
 
-    /// Where a point at rest in the world is seen from the body `dt` seconds later (earlier when negative), m.
-    /// Exact for a constant twist.
+    /// Position of a point at rest in the world, in the frame of the body `dt` seconds later (earlier when negative),
+    /// m. Exact for a constant twist.
     pub fn pass_below(self, p: [f64; 2], dt: f64) -> [f64; 2] {
         let angle = self.turn_rate * dt;
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
@@ -67,12 +67,12 @@ pub enum TouchDown {
     Contact(Search),
 }
 
-/// How a foot finds the ground.
+/// Search of a foot for the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
     /// Force at which the foot counts as standing, as a share of the mean load over the number of legs.
     pub share: f64,
-    /// How far below the plane of the standing feet it looks for the ground, m.
+    /// Depth of the search for the ground below the plane of the standing feet, m.
     pub depth: f64,
     /// Speed at which it looks further down, m/s.
     pub speed: f64,
@@ -80,14 +80,14 @@ pub struct Search {
     pub levelling_s: f64,
 }
 
-/// What a foot knows of the ground during a step.
+/// Measurements of the ground at a foot during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensed {
     /// Normal force on the foot, N.
     pub force: f64,
     /// Force from which on it stands, N.
     pub threshold: f64,
-    /// How it looks for ground.
+    /// Its search for ground.
     pub search: Search,
 }
 
@@ -115,7 +115,7 @@ pub struct Foot {
     from_height: f64,
 }
 
-/// What holds for all feet during a step.
+/// Parameters of all feet during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
     /// Duration, s.
@@ -128,7 +128,7 @@ pub struct Cycle {
     pub twist: Twist,
     /// Whether standing feet may leave the ground.
     pub stepping: bool,
-    /// Where the swing begins and ends at rest.
+    /// Swing that begins and ends at rest.
     pub swing: Swing,
     /// Whether the cycle stands still, until a foot that looks for the ground has found it.
     pub waiting: bool,
@@ -169,7 +169,7 @@ impl Foot {
         cycle.stepping && !self.airborne && (0.0..=dt).contains(&until)
     }
 
-    /// What the force at the start of a step of `dt` s says: the swing ends in its last quarter; a foot that should
+    /// Reacts to the force at the start of a step of `dt` s: the swing ends in its last quarter; a foot that should
     /// stand and presses on nothing goes further down, as far as it may.
     pub fn feel(&mut self, cycle: &Cycle, sensed: &Sensed, dt: f64) {
         let presses = sensed.force > sensed.threshold;
@@ -206,7 +206,7 @@ impl Foot {
         }
     }
 
-    /// Where the next stance begins: half a stance ahead of the neutral point, m.
+    /// Start of the next stance: half a stance ahead of the neutral point, m.
     fn touch_down(cycle: &Cycle, neutral: [f64; 2]) -> [f64; 2] {
         cycle.twist.pass_below(neutral, -0.5 * cycle.duty * cycle.period)
     }

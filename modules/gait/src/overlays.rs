@@ -1,5 +1,5 @@
-//! What the gait shows, in the frame of the body that it walks: the support polygon, where the feet are to be, and where those in
-//! the air come down.
+//! Overlays of the gait, in the frame of the body that it walks: the support polygon, the targets of the feet, and the
+//! touchdowns of those in the air.
 
 use crate::foot::Foot;
 use crate::parameters::Settings;

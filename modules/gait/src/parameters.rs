@@ -8,7 +8,7 @@ use crate::posture::Gains;
 use std::f64::consts::FRAC_PI_2;
 use terraglue_subsystem::{Config, Error, Kind, Mount, Parameter, ParameterType, Result, Schema};
 
-/// What stays the same over a run.
+/// Constants of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Legs in the order of [`crate::geometry::LEG_NAMES`].

@@ -11,7 +11,7 @@ use crate::posture::{Posture, wrap};
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::{self, Persist};
 
-/// What the machine is doing.
+/// Mode of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mode {
     /// All feet rest; walking starts when the time (s) has passed and a speed is commanded.
@@ -25,7 +25,7 @@ pub enum Mode {
 /// Everything that changes from step to step; a copy of it is a snapshot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walker {
-    /// What it is doing.
+    /// Its mode.
     pub mode: Mode,
     /// Pattern in force.
     pub pattern: Pattern,
@@ -159,7 +159,7 @@ impl Walker {
         self.level(&search, command, dt);
     }
 
-    /// What the forces say at the start of a step of walking.
+    /// Reacts to the forces at the start of a step of walking.
     fn feel(&mut self, cycle: &Cycle, search: &Search, command: &Command, dt: f64) {
         for leg in 0..LEGS {
             if let Some(sensed) = self.sensed(search, command, leg) {
@@ -182,7 +182,7 @@ impl Walker {
             && self.feet.iter().zip(&settings.neutral).filter(|(f, _)| !f.airborne).all(near)
     }
 
-    /// What a foot feels, where it is told.
+    /// Measurement of a foot, if it is connected.
     fn sensed(&self, search: &Search, command: &Command, leg: usize) -> Option<Sensed> {
         let threshold = search.share * self.load.mean() / LEGS as f64;
         command.contact[leg].map(|force| Sensed { force, threshold, search: *search })

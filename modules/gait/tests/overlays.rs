@@ -1,4 +1,4 @@
-//! What the gait shows in the frame of the body that it walks.
+//! Overlays of the gait in the frame of the body that it walks.
 
 mod common;
 use common::{gait, run, standing, targets};

@@ -1,4 +1,4 @@
-//! What a gait has to keep whatever it is asked for: feet on the ground, support, smooth targets, speed, turning.
+//! Properties of a gait under every command: feet on the ground, support, smooth targets, speed, turning.
 
 mod common;
 use common::{H, gait, read, run, set, standing, step, targets};

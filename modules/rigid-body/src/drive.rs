@@ -17,7 +17,7 @@ pub(crate) const FULL_BLOCK: f64 = 1e12;
 /// By how much a rigid motor gives way at its largest torque while bodies touch, rad/s or m/s. Between feet that
 /// motors hold apart rigidly, forces are not determined, and whether a motor is at its bound neither.
 pub(crate) const YIELDING: f64 = 1e-7;
-/// Where no consistent state is found it is raised up to this.
+/// If no consistent state is found it is raised up to this.
 pub(crate) const MOST_YIELDING: f64 = 1e-2;
 
 /// The step for which an axis is made.
@@ -50,7 +50,7 @@ pub(crate) struct Axis {
     slips: bool,
 }
 
-/// Who gives which part of the impulse of an axis, N m s.
+/// Shares of the impulse of an axis, N m s.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Shares {
     pub motor: f64,
@@ -135,7 +135,7 @@ impl Axis {
         matches!(self.motor.tag_at(u), Tag::SupplyHigh | Tag::SupplyLow)
     }
 
-    /// Who gives which part of the impulse λ at the rate u.
+    /// Shares of the impulse λ at the rate u.
     pub fn shares(&self, mode: Mode, u: f64, lambda: f64) -> Shares {
         let [armature, spring, damper] = self.passive.map(|l| l.at(u));
         let rest = lambda - armature - spring - damper;
@@ -163,7 +163,7 @@ impl Axis {
     }
 }
 
-/// What a motor is asked for, without any bound.
+/// Command of a motor, without any bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum MotorLaw {
     /// Impulse against rate.

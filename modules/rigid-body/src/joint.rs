@@ -3,7 +3,7 @@
 use crate::math::{Q, V3};
 use terraglue_robot_import as import;
 
-/// What a joint leaves free.
+/// Freedoms of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Revolute,
@@ -34,7 +34,7 @@ pub(crate) struct Joint {
     pub parent_frame: Q,
     pub child_frame: Q,
     pub limits: Option<[f64; 2]>,
-    /// What the file says about its axis.
+    /// Data of its axis from the file.
     pub data: import::AxisData,
 }
 

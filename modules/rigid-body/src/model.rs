@@ -1,4 +1,4 @@
-//! What stays constant over the life of an instance: bodies, joints, shapes.
+//! Constants of an instance: bodies, joints, shapes.
 
 use crate::closure::Closure;
 use crate::contact::plane::Plane;

@@ -106,7 +106,7 @@ fn committed(model: &Model, bodies: Vec<Motion>, joints: Vec<JointState>, supply
     }
 }
 
-/// What the log says of a robot that was read.
+/// Summary of a robot for the log.
 fn summary(name: &str, model: &Model) -> String {
     let (bodies, joints) = (model.bodies.len(), model.joints.len());
     format!("{name}: {bodies} bodies, {joints} joints, {:.6} kg", model.mass())

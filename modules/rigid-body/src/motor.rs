@@ -1,6 +1,6 @@
 //! The ways in which the motor of a joint can be driven.
 
-/// How the motor of a joint is driven. The numbers are the values of the variable `motor`.
+/// Control mode of the motor of a joint. The numbers are the values of the variable `motor`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Motor {
     Off,

@@ -1,4 +1,4 @@
-//! Where the robot starts: joint coordinates by name pattern, pose of the root, feet on the ground.
+//! Initial placement of the robot: joint coordinates by name pattern, pose of the root, feet on the ground.
 
 use crate::contact::shapes::{parry_local, parry_shape};
 use crate::dynamics::joint_rows::{place_child, rates_of_child};
@@ -94,7 +94,7 @@ pub(crate) fn at_rest(model: &Model, base: &Isometry3<f64>, coordinates: &[f64])
     bodies
 }
 
-/// How everything moves at the start.
+/// Rates of all bodies at the start.
 pub(crate) struct StartRates {
     /// Velocity of the root frame's origin, world axes, m/s.
     pub velocity: V3,

@@ -49,7 +49,7 @@ pub(crate) struct Robot {
     scratch: EstimateScratch,
 }
 
-/// What a preparation depends on besides the ports.
+/// Data on which a preparation depends besides the ports.
 #[derive(Clone, Copy, PartialEq)]
 struct Prepared {
     revision: u64,
@@ -64,7 +64,7 @@ struct EstimateScratch {
     free: Vec<f64>,
 }
 
-/// How a trial is solved.
+/// Solver of a trial.
 type Solve = fn(&mut Dynamics) -> std::result::Result<(), Failure>;
 
 fn failed(failure: Failure) -> Error {

@@ -1,4 +1,4 @@
-//! What of the robot and of the world in its files can be seen and hit, and where its bodies are.
+//! Shapes of the robot and of the world in its files that can be seen and hit, and the poses of its bodies.
 
 use crate::closure::{Closure, ClosureLaw};
 use crate::joint::{Joint, Kind};
@@ -19,8 +19,8 @@ const DRAWN_NODES: usize = 129;
 
 /// All bodies and shapes; ids count through the shapes.
 ///
-/// What stands still in the world belongs to one more body without mass behind all others. It is seen only: the bodies of
-/// this subsystem hit it inside, and no other subsystem does.
+/// Shapes that stand still in the world belong to one more body without mass behind all others. It is seen only: the
+/// bodies of this subsystem hit it inside, and no other subsystem does.
 pub(crate) fn scene(model: &Model) -> Scene {
     let mut bodies: Vec<SceneBody> =
         model.bodies.iter().map(|b| SceneBody { name: b.name.clone(), mass: b.mass }).collect();

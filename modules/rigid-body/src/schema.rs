@@ -2,7 +2,7 @@
 
 use terraglue_subsystem::{Kind, Parameter, ParameterType, Schema};
 
-/// What a scenario may say about a robot.
+/// Parameters of a robot in a scenario.
 pub(crate) fn schema() -> Schema {
     Schema {
         name: "rigid-body".into(),
@@ -43,7 +43,7 @@ fn file() -> Vec<Parameter> {
     ]
 }
 
-/// Where the robot is at the start, and how it moves.
+/// Position and motion of the robot at the start.
 fn start() -> Vec<Parameter> {
     vec![
         Parameter {
@@ -91,7 +91,7 @@ fn start() -> Vec<Parameter> {
     ]
 }
 
-/// What is made of the file, and how it is stepped.
+/// Parameters of reading the file and of stepping.
 fn making() -> Vec<Parameter> {
     vec![
         Parameter::of(
@@ -123,7 +123,7 @@ fn making() -> Vec<Parameter> {
     ]
 }
 
-/// How the motors are driven at the start.
+/// Commands of the motors at the start.
 fn motors() -> Vec<Parameter> {
     vec![
         Parameter::of(

@@ -12,7 +12,7 @@ use terraglue_subsystem::Energy;
 
 mod bytes;
 
-/// What pushes a body from outside, world axes.
+/// External force and moment on a body, world axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Load {
     /// Force at the centre of mass, N.
@@ -27,7 +27,7 @@ pub(crate) struct JointState {
     /// Committed coordinate and rate, rad or m.
     pub angle: f64,
     pub velocity: f64,
-    /// What the motor gave in the last step, N m or N.
+    /// Torque or force of the motor in the last step, N m or N.
     pub torque: f64,
     pub angle_target: f64,
     pub velocity_target: f64,
@@ -55,7 +55,7 @@ pub(crate) struct ClosureState {
     pub stored: f64,
 }
 
-/// What the last step says about contacts among the bodies and with rigid ground.
+/// Results of the last step for contacts among the bodies and with rigid ground.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct ContactLedger {
     /// Points that pressed.
@@ -64,7 +64,7 @@ pub(crate) struct ContactLedger {
     pub residual: f64,
     /// Energy lost in impacts and friction since the start, J.
     pub lost: f64,
-    /// How far rigid motors gave way at their largest torque, rad/s or m/s.
+    /// Rate by which rigid motors gave way at their largest torque, rad/s or m/s.
     pub yielding: f64,
 }
 
@@ -78,7 +78,8 @@ pub(crate) struct State {
     pub redundant_rows: usize,
     /// External force and moment of each body.
     pub loads: Vec<Load>,
-    /// What each joint exerts on its child in the last step: force at the anchor, moment about it, world axes, N and N m.
+    /// Reaction of each joint on its child in the last step: force at the anchor, moment about it, world axes, N and N
+    /// m.
     pub reactions: Vec<[f64; 6]>,
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
@@ -87,7 +88,7 @@ pub(crate) struct State {
     /// Contact forces of the last step.
     pub pressed: Vec<Pressed>,
     pub supply: Supply,
-    /// Where body 0 was at the start; distances are counted from there.
+    /// Position of body 0 at the start; distances are counted from there.
     pub start: Option<V3>,
     /// By how much positions are ahead of rates, s: half the last step, 0 at the start.
     pub stagger: f64,

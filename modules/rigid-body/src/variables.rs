@@ -15,7 +15,7 @@ use terraglue_subsystem::{Action, Causality, Effect, Error, JointVariables, Resu
 const BODY_STRIDE: u32 = 32;
 const JOINT_STRIDE: u32 = 128;
 
-/// What an id means.
+/// Meaning of an id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Meaning {
     Body {
@@ -89,7 +89,7 @@ const SETTING: u32 = 48;
 /// First of [`REACTION_ITEMS`].
 const REACTION: u32 = 120;
 
-/// What every joint of the tree carries.
+/// Reactions of every joint of the tree.
 const REACTION_ITEMS: [(&str, &str, &str); 6] = [
     ("reaction_x", "N", "Force that the joint exerts on its child in the last step, world axes"),
     ("reaction_y", "N", "Force that the joint exerts on its child in the last step, world axes"),
@@ -99,7 +99,7 @@ const REACTION_ITEMS: [(&str, &str, &str); 6] = [
     ("reaction_mz", "N m", "Moment on the child about the joint's origin, motor included, world axes"),
 ];
 
-/// What an actuator tells: name, unit (of a joint that turns), who has it, help, where it stands.
+/// Variable of an actuator: name, unit (of a joint that turns), group, help, value.
 type ActuatorItem = (&'static str, &'static str, Group, &'static str, fn(&JointState) -> f64);
 
 const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
@@ -131,7 +131,7 @@ const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
     ("housing_temperature", "K", Group::Thermal, "Temperature of the housing", |j| j.actuator.housing_k),
 ];
 
-/// What the robot as a whole tells.
+/// Variables of the robot as a whole.
 const ROBOT_ITEMS: [(&str, &str, &str); 17] = [
     ("energy.motor_work", "J", "Mechanical work of all motors since the start"),
     ("energy.electrical", "J", "Electrical energy drawn by all motors since the start"),
@@ -219,7 +219,7 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
     all
 }
 
-/// Where the values of a joint of the tree are found.
+/// Variables that hold the values of a joint of the tree.
 pub(crate) fn of_joint(model: &Model, j: usize) -> JointVariables {
     let id = model.bodies.len() as u32 * BODY_STRIDE + j as u32 * JOINT_STRIDE;
     let of = |item: u32| if model.joints[j].moves() { id + item } else { JointVariables::NONE };
@@ -266,7 +266,7 @@ fn describe_closures(model: &Model, all: &mut Vec<Variable>) {
     }
 }
 
-/// What an actuator tells, and its data.
+/// Variables of an actuator, and its data.
 fn describe_actuator(id: u32, name: &str, kind: Kind, j: &JointState, all: &mut Vec<Variable>) {
     let unit = |of: &'static str| if kind == Kind::Prismatic { for_sliding(of) } else { of };
     let a = &j.actuator;
@@ -359,7 +359,7 @@ pub(crate) fn actions(model: &Model) -> Vec<Action> {
     all
 }
 
-/// What an id means in this model.
+/// Meaning of an id in this model.
 pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
     let first = model.bodies.len() as u32 * BODY_STRIDE;
     let unknown = || Error::Refused(format!("there is no variable number {id}"));
@@ -633,7 +633,7 @@ pub(crate) fn block(state: &mut State, joint: usize, hold: bool) -> Result {
 pub(crate) fn break_joint(state: &mut State, joint: usize) {
     let j = &mut state.joints[joint];
     if !j.broken {
-        // What spring and armature hold is lost with the joint.
+        // Energy of spring and armature is lost with the joint.
         let (spring, armature) = j.actuator.stored(j.angle);
         state.energy.dissipated += spring + armature;
     }

@@ -62,7 +62,7 @@ fn the_current_rises_with_the_time_constant_of_the_winding() {
         let (t, tau) = (f64::from(n) * 1e-3, 0.05);
         let exact = 30.0 * (1.0 - libm::exp(-t / tau));
         assert!((fixture.get("j.current") - exact).abs() < 30.0 * 0.5 * 1e-3 / tau, "{n}");
-        // What the scheme itself gives, exactly.
+        // The result of the scheme itself, exactly.
         close(fixture.get("j.current"), 30.0 * (1.0 - libm::pow(1.0 + 1e-3 / tau, -f64::from(n))), 1e-9);
     }
 }

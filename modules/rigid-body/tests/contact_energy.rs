@@ -1,4 +1,4 @@
-//! What impacts and friction take is booked: mechanical energy and losses add up to what there was.
+//! Losses in impacts and friction are booked: mechanical energy and losses add up to the initial energy.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;

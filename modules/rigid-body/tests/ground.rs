@@ -65,7 +65,7 @@ fn a_sphere_rolls_down_the_incline() {
     assert!((a / exact - 1.0).abs() < 1e-3, "{a} {exact}");
 }
 
-/// How high a ball comes back that is dropped from 1 m.
+/// Height of the rebound of a ball that is dropped from 1 m.
 fn rebound(name: &str, more: &str) -> f64 {
     let mut fixture = on_incline(name, &sphere_link("s", 1.0, 0.1), 1.1, 0.0, more);
     let mut apex: f64 = 0.0;

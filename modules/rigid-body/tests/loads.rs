@@ -37,7 +37,7 @@ fn a_moment_about_a_principal_axis_spins_the_body_up_and_its_work_is_the_energy(
     }
 }
 
-/// What the energy of a tumbling body misses of the work of force and moment after a second, J; and that work.
+/// Difference of the energy of a tumbling body from the work of force and moment after a second, J; and that work.
 fn missed(integrator: &str, h: f64) -> [f64; 2] {
     let mut fixture = body(&format!("driven_{integrator}"), integrator, [1.0, 2.0, -1.5], h);
     for (name, value) in [("force_x", 3.0), ("moment_x", 0.3), ("moment_y", -0.4), ("moment_z", 0.2)] {

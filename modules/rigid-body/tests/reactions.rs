@@ -1,4 +1,4 @@
-//! What joints carry, against closed forms of statics.
+//! Reactions of joints, against closed forms of statics.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;

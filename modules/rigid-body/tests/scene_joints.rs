@@ -12,7 +12,7 @@ fn isometry(p: &Pose) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(p.position), turn)
 }
 
-/// Where a joint of the scene is in the world, and the direction of its axis.
+/// Position of a joint of the scene in the world, and the direction of its axis.
 fn placed(f: &Fixture, joint: &SceneJoint) -> (Vector3<f64>, Vector3<f64>) {
     let parent = match joint.parent {
         SceneJoint::WORLD => Isometry3::identity(),

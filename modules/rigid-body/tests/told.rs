@@ -1,4 +1,4 @@
-//! What the robot tells as variables: energies, gaps; names that two of them would have.
+//! Variables of the robot: energies, gaps; names that two of them would have.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
@@ -38,7 +38,7 @@ fn energies_are_those_of_a_falling_pendulum() {
         assert_eq!(fixture.get("energy.potential"), e.potential);
         assert_eq!(fixture.get("energy.dissipated"), e.dissipated);
     }
-    // What has fallen moves or is heat: all of the energy was 0 at the start.
+    // Lost potential energy is kinetic or heat: all of the energy was 0 at the start.
     let [kinetic, potential, heat] =
         ["kinetic", "potential", "dissipated"].map(|e| fixture.get(&format!("energy.{e}")));
     assert!(kinetic > 1.0 && heat > 0.1 && (kinetic + potential + heat).abs() < 0.02 * kinetic);
@@ -58,7 +58,7 @@ fn the_gap_is_that_of_joints_and_loops_that_hold() {
     let mut fixture = Fixture::new(&text, 9.81, 1e-3);
     (0..100).for_each(|_| fixture.free_step());
     assert!(fixture.get("joints.gap") < 1e-10, "{}", fixture.get("joints.gap"));
-    // What is broken may be anywhere.
+    // A broken part may be anywhere.
     fixture.robot.act("gear.break", "{}").unwrap();
     fixture.robot.act("k.break", "{}").unwrap();
     (0..100).for_each(|_| fixture.free_step());

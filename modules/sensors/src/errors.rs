@@ -1,6 +1,6 @@
 //! Errors of a channel: bias, white noise, rounding; and the numbers that they are drawn from.
 
-/// What is wrong with a channel.
+/// Errors of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ErrorModel {
     /// Standard deviation of the part that stays the same over a run.
@@ -38,7 +38,7 @@ impl Errors {
         Self { seed, models }
     }
 
-    /// What a channel shows of `truth` in a sample.
+    /// Output of a channel for `truth` in a sample.
     pub fn shown(&self, channel: usize, sample: u64, truth: f64) -> f64 {
         let model = &self.models[usize::from(channel >= 3)];
         let mut value = truth;

@@ -1,4 +1,4 @@
-//! What the sensors that sit on a body find in the world, without any error.
+//! Measurements of the sensors that sit on a body, without any error.
 
 use crate::kind::{MOST, SensorKind};
 use terraglue_subsystem::{Mount, Pose, Ray, RayHit, RayMask, Result, World, persist};
@@ -64,7 +64,7 @@ pub(crate) fn range(mount: &mut Mount, world: &dyn World, time: f64, range_m: f6
     Ok(Truth { values, switch: hits[0].is_hit() })
 }
 
-/// What a sensor makes of its inputs.
+/// Measurement of a sensor from its inputs.
 pub(crate) fn inputs(kind: SensorKind, values: [f64; MOST], threshold_n: f64, was: bool) -> Truth {
     let limit = if was { 0.5 * threshold_n } else { threshold_n };
     let pressed = values[0] > 0.0 && values[0] >= limit;

@@ -7,7 +7,7 @@ use crate::settings::{self, Settings};
 use std::sync::Arc;
 use terraglue_subsystem::{
     Capabilities, Config, Error, Figure, Host, Input, Module, Motion, Overlay, Pose, Response, Result,
-    Schema, Step, Subsystem, ValueType, Values, ValuesMut, Variable, World, bytes, persist,
+    Schema, Slots, Step, Subsystem, ValueType, Values, ValuesMut, Variable, World, bytes, persist,
 };
 
 /// Form of the serialized state.
@@ -22,7 +22,7 @@ pub struct Sensor {
     gravity: [f64; 3],
     variables: Vec<Variable>,
     state: State,
-    slots: Vec<Option<State>>,
+    slots: Slots<State>,
 }
 
 /// A sample on its way.
@@ -35,7 +35,7 @@ struct Sample {
 }
 persist!(Sample { due, values, switch });
 
-/// What is remembered from step to step.
+/// State from step to step.
 #[derive(Clone, Debug, PartialEq)]
 struct State {
     inputs: [f64; MOST],
@@ -73,7 +73,7 @@ impl Module for Sensor {
             variables: settings.kind.variables(),
             settings,
             state,
-            slots: vec![None; host.slots() as usize],
+            slots: Slots::new(host.slots()),
         }))
     }
 }
@@ -114,7 +114,7 @@ impl Sensor {
         }
     }
 
-    /// What sits on a body looks.
+    /// Measurement of a sensor on a body.
     fn look(&mut self, time: f64, world: &dyn World) -> Result<Truth> {
         let Self { settings, state, gravity, .. } = self;
         let Settings { kind, mount, range_m, .. } = settings;
@@ -176,14 +176,11 @@ impl Subsystem for Sensor {
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
-        let none = || Error::Refused(format!("there is no slot {slot}"));
-        *self.slots.get_mut(slot as usize).ok_or_else(none)? = Some(self.state.clone());
-        Ok(())
+        self.slots.save(slot, self.state.clone())
     }
 
     fn restore_state(&mut self, slot: u32) -> Result {
-        let saved = self.slots.get(slot as usize).cloned().flatten();
-        self.state = saved.ok_or_else(|| Error::Refused(format!("nothing was saved in slot {slot}")))?;
+        self.state = self.slots.saved(slot)?;
         Ok(())
     }
 

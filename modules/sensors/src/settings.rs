@@ -4,7 +4,7 @@ use crate::errors::ErrorModel;
 use crate::kind::SensorKind;
 use terraglue_subsystem::{Config, Error, Kind, Mount, Parameter, ParameterType, Result, Schema};
 
-/// What a scenario says of a sensor.
+/// Parameters of a sensor in a scenario.
 #[derive(Clone, Debug)]
 pub(crate) struct Settings {
     pub kind: SensorKind,

@@ -118,7 +118,9 @@ fn unsafe_code_stands_only_at_the_borders() {
     ];
     for path in rust_files().iter().filter(|p| !borders.iter().any(|b| p.starts_with(b))) {
         let text = read(path);
-        let found = code_lines(&text).find(|(_, line)| has_word(line, "unsafe"));
+        // names of options of other programs are no code
+        let code = |line: &str| line.split('"').step_by(2).collect::<String>();
+        let found = code_lines(&text).find(|(_, line)| has_word(&code(line), "unsafe"));
         assert!(found.is_none(), "{}:{}: unsafe code", path.display(), found.map_or(0, |f| f.0));
     }
 }

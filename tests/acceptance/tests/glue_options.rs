@@ -306,3 +306,32 @@ k_u = [15e3, 15e3, 15e3, 15e3, 15e3, 15e3]
     }
     assert!((read(&testbed, "table.heave") - 0.006722347916667).abs() < 1e-11);
 }
+
+/// Two rods glued at their centres, which are one metre apart.
+fn apart(more: &str) -> String {
+    let text = pendulum("").replace("pose = [1.5, 0.0, 0.0]", "pose = [1.5, 0.05, 0.0]");
+    text.replace("at_m = [1.0, 0.0, 0.0]", more)
+}
+
+#[test]
+fn a_gap_at_the_start_is_refused_unless_a_ramp_closes_it() {
+    let refused = glued(&apart("")).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(refused.contains("are 1.0012 m apart"), "{refused}");
+    let mut testbed = build(&apart("ramp_s = 0.5"));
+    let gap = |t: &Testbed| {
+        let d = |axis: &str| read(t, &format!("upper.b0.{axis}")) - read(t, &format!("lower.b0.{axis}"));
+        d("x").hypot(d("y"))
+    };
+    let (start, mut before, mut fastest) = (gap(&testbed), 0.0, 0.0_f64);
+    while testbed.t_s() < 0.6 {
+        testbed.step().unwrap_or_else(|e| panic!("{e}"));
+        let now = gap(&testbed);
+        let s: f64 = (testbed.t_s() / 0.5).min(1.0);
+        let left = start * (1.0 - s * s * s * (10.0 + s * (6.0 * s - 15.0)));
+        assert!((now - left).abs() < 1e-9, "at {} s: {now} m, wanted {left} m", testbed.t_s());
+        fastest = fastest.max((before - now) / 0.005);
+        before = now;
+    }
+    // 15/8 of the mean rate, and no jump
+    assert!(before < 1e-9 && fastest < 1.9 * start / 0.5, "{before} {fastest}");
+}

@@ -9,6 +9,7 @@ mod documents;
 mod faults;
 mod figure;
 mod fmi;
+mod forest;
 mod gluing;
 mod known;
 mod page;
@@ -21,6 +22,7 @@ mod stored;
 mod table;
 mod timing;
 mod walk;
+mod watched;
 mod world;
 
 pub use faults::write_page as write_faults_page;
@@ -106,7 +108,7 @@ impl Context {
 type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
 /// Areas with their parts, in the order of the tables.
-const AREAS: [(&str, &[Part]); 7] = [
+const AREAS: [(&str, &[Part]); 9] = [
     ("walk", &[("walk", walk::figures), ("speed", walk::speed::figures)]),
     ("rigid-body", &rigid_body::PARTS),
     ("soil", &soil::PARTS),
@@ -114,6 +116,8 @@ const AREAS: [(&str, &[Part]); 7] = [
     ("fmi", &fmi::PARTS),
     ("plugins", &plugins::PARTS),
     ("world", &world::PARTS),
+    ("forest", &forest::PARTS),
+    ("page", &watched::PARTS),
 ];
 
 fn area_names() -> Vec<&'static str> {

@@ -1,7 +1,7 @@
 //! Which runs a comparison takes: every combination, each checked before the first one starts.
 
 use crate::arguments::{CompareArguments, RunArguments};
-use crate::{logger, run, soil_module};
+use crate::{logger, soil_module, testbed};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -269,7 +269,7 @@ fn check_folder(plans: &[Plan], folder: &Path) -> Result {
 pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Result {
     for plan in plans.iter_mut().filter(|p| p.refused.is_none()) {
         let _said = logger::of_run(&plan.name);
-        plan.refused = run::build(&plan.scenario, &run::options(arguments, cancel)).err();
+        plan.refused = testbed::build(&plan.scenario, &testbed::options(arguments, cancel)).err();
     }
     let wrong: Vec<bool> = plans.iter().map(|plan| is_wrong(plan, plans)).collect();
     plans.iter_mut().zip(wrong).for_each(|(plan, wrong)| plan.is_wrong = wrong);

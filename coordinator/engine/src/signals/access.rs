@@ -56,7 +56,7 @@ impl Directory {
         &self.names
     }
 
-    /// What a full name stands for.
+    /// Variable of a full name.
     pub fn find(&self, name: &str) -> Option<VariableRef> {
         self.names.iter().position(|n| n == name).map(|k| self.refs[k])
     }
@@ -125,8 +125,8 @@ impl VariableRef {
         }
     }
 
-    /// What a value from a scenario, an operator or a script is as a number of this variable; the reason where
-    /// it cannot be set: read-only, out of range or of the wrong type. Texts have no number.
+    /// Number of this variable for a value from a scenario, an operator or a script; the reason if it cannot be set:
+    /// read-only, out of range or of the wrong type. Texts have no number.
     fn number_for(v: &Variable, value: &Value) -> std::result::Result<Option<f64>, String> {
         if v.effect == Effect::ReadOnly {
             return Err(format!("`{}` is read-only", v.name));

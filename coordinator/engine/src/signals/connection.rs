@@ -2,14 +2,16 @@
 
 use super::access::{Directory, VariableRef};
 use super::discrete::{self, Discrete};
+use super::extrapolation::{Extrapolation, Moment};
 use super::pattern;
 use super::stream_link::{self, StreamLink};
 use super::table;
 use terraglue_diagnostics::Result;
+use terraglue_gluing::memory::Recall;
 use terraglue_host::{Instance, Reply};
-use terraglue_scenario::{Connection, InputError, Source};
+use terraglue_scenario::{Connection, ConnectionOrder, InputError, Source};
 use terraglue_subsystem::unit::Unit;
-use terraglue_subsystem::{Causality, ValueType, Values, ValuesMut};
+use terraglue_subsystem::{Capabilities, Causality, ValueType, Values, ValuesMut};
 
 /// Subsystem and variable on either side of a value, and value_to = a·value_from + b.
 pub type Ends = ([(usize, u32); 2], (f64, f64));
@@ -20,10 +22,14 @@ pub type Ends = ([(usize, u32); 2], (f64, f64));
 pub struct Link {
     from: usize,
     to: usize,
+    /// When within a step it passes values.
+    order: ConnectionOrder,
     /// Of the outputs, then of the inputs.
     ids: Vec<u32>,
     /// Values, then a and then b of value_to = a·value_from + b.
     numbers: Vec<f64>,
+    /// The line that the inputs follow, where they are not held.
+    extrapolation: Option<Box<Extrapolation>>,
 }
 
 impl Link {
@@ -49,6 +55,41 @@ impl Link {
     #[inline]
     pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
         self.write(instances, &self.numbers[..self.count()])
+    }
+
+    /// The same at the start of a step: inputs that are not held follow their line.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem refuses the values or fails.
+    #[inline]
+    pub fn pass_on_ahead(&self, instances: &mut [Instance]) -> Result {
+        match self.extrapolation.as_ref().and_then(|line| line.ahead()) {
+            None => self.pass_on(instances),
+            Some(ahead) => self.write(instances, ahead),
+        }
+    }
+
+    /// Goes on along the line through the last two values, where there is one.
+    #[inline]
+    pub fn extrapolate(&mut self, moment: Moment) {
+        if let Some(line) = &mut self.extrapolation {
+            line.take(moment, &self.numbers[..self.ids.len() / 2]);
+        }
+    }
+
+    /// Whether its inputs follow a line.
+    pub fn is_extrapolated(&self) -> bool {
+        self.extrapolation.is_some()
+    }
+
+    /// For a snapshot.
+    pub fn remember(&self, out: &mut Vec<u64>) {
+        self.extrapolation.iter().for_each(|line| line.remember(out));
+    }
+
+    /// Back to a snapshot.
+    pub fn recall(&mut self, kept: &mut Recall) {
+        self.extrapolation.iter_mut().for_each(|line| line.recall(kept));
     }
 
     /// Values of the outputs, in the units of the inputs.
@@ -130,6 +171,21 @@ impl Link {
         kind(self.from)
     }
 
+    /// Subsystems on either side.
+    pub fn slots(&self) -> [usize; 2] {
+        [self.from, self.to]
+    }
+
+    /// Whether it may pass values within a step where that avoids a delay.
+    pub fn is_ordered(&self) -> bool {
+        self.order == ConnectionOrder::Structure
+    }
+
+    /// Whether the step is repeated until its values stand.
+    pub fn is_iterated(&self) -> bool {
+        self.order == ConnectionOrder::Iterate
+    }
+
     /// Number of values.
     #[inline]
     pub fn count(&self) -> usize {
@@ -170,13 +226,29 @@ fn element(name: &str) -> Option<(&str, &str)> {
     name.ends_with(']').then(|| name.rfind('[').map(|at| name.split_at(at))).flatten()
 }
 
-/// What a variable is connected to: by its own name, or as an element of a whole array that is named.
+/// Source of a variable in a connection: by its own name, or as an element of a whole array that is named.
 fn target(connection: &Connection, name: &str) -> Option<(String, bool)> {
     if let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) {
         return Some((target, false));
     }
     let (base, index) = element(name)?;
     pattern::rewrite(&connection.from, &connection.to, base).map(|target| (target + index, true))
+}
+
+/// The other form of a target that does not exist: an array of one element and a scalar fit each other.
+fn single(directory: &Directory, name: &str, target: &str, of_array: bool) -> Option<String> {
+    let count = |base: &str| {
+        directory.names().iter().filter(|n| element(n).is_some_and(|(own, _)| own == base)).count()
+    };
+    if directory.find(target).is_some() || of_array && count(element(name)?.0) != 1 {
+        return None;
+    }
+    let scalar = if of_array { element(target)?.0 } else { target };
+    if directory.find(scalar).is_some() {
+        return Some(scalar.to_owned());
+    }
+    let elements = ["[1]", "[1,1]"].iter().map(|index| format!("{scalar}{index}"));
+    elements.into_iter().find(|name| directory.find(name).is_some() && count(scalar) == 1)
 }
 
 /// Why two whole arrays cannot be connected, where their shapes differ.
@@ -196,7 +268,7 @@ fn shapes_differ(directory: &Directory, name: &str, target: &str) -> Option<Stri
     })
 }
 
-/// Resolves all connections of a scenario into links, in the order of the file.
+/// Resolves all connections of a scenario into links, in the order of the file. `multiples`: steps of the testbed per step of each instance.
 ///
 /// # Errors
 /// A connection that matches nothing, names a variable that does not exist, joins what does not fit, or feeds an input twice.
@@ -204,9 +276,11 @@ pub fn connect(
     connections: &[Connection],
     directory: &Directory,
     instances: &[Instance],
+    multiples: &[u32],
     source: &Source,
 ) -> std::result::Result<Links, Box<InputError>> {
-    let mut resolving = Resolving { directory, instances, source, links: Links::default(), fed: Vec::new() };
+    let mut resolving =
+        Resolving { directory, instances, multiples, source, links: Links::default(), fed: Vec::new() };
     for connection in connections {
         let variables = resolving.variables(connection)?;
         let streams = resolving.streams(connection)?;
@@ -223,6 +297,7 @@ pub fn connect(
 struct Resolving<'a> {
     directory: &'a Directory,
     instances: &'a [Instance],
+    multiples: &'a [u32],
     source: &'a Source,
     links: Links,
     /// Inputs that are fed, and by what.
@@ -276,6 +351,10 @@ impl Resolving<'_> {
         for (name, from) in directory.iter() {
             let Some((target, of_array)) = target(connection, name) else { continue };
             matched = true;
+            let (target, of_array) = match single(directory, name, &target, of_array) {
+                Some(single) => (single, false),
+                None => (target, of_array),
+            };
             if let Some(message) = of_array.then(|| shapes_differ(directory, name, &target)).flatten() {
                 return Err(self.refuse(connection, &connection.to, message, None));
             }
@@ -284,13 +363,13 @@ impl Resolving<'_> {
                 .map_err(|message| self.refuse(connection, &connection.to, message, None))?;
             self.feed(connection, name, (&target, to))?;
             if from.describe(instances).value_type == ValueType::F64 {
-                add(&mut self.links.numbers, instances, from, to, conversion);
+                self.add([from, to], conversion, connection);
                 continue;
             }
             let table = table::resolve(&connection.map, instances, from, to).map_err(|message| {
                 self.refuse(connection, "map", format!("`{name}` → `{target}`: {message}"), None)
             })?;
-            self.links.discrete.push(Discrete::new(from, to, table, conversion));
+            self.links.discrete.push(Discrete::new([from, to], table, conversion, connection.order));
         }
         Ok(matched)
     }
@@ -309,6 +388,32 @@ impl Resolving<'_> {
             self.links.streams.push(StreamLink::new(number, to));
         }
         Ok(matched)
+    }
+
+    /// Adds a value to the link of its subsystems.
+    fn add(&mut self, [from, to]: [VariableRef; 2], conversion: (f64, f64), connection: &Connection) {
+        let (instances, multiples) = (self.instances, self.multiples);
+        let Connection { order, extrapolate, .. } = *connection;
+        let links = &mut self.links.numbers;
+        let same = |l: &Link| {
+            l.from == from.slot && l.to == to.slot && l.order == order && l.is_extrapolated() == extrapolate
+        };
+        let k = links.iter().position(same).unwrap_or_else(|| {
+            let takes_end = instances[to.slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
+            let line = || Extrapolation::new([from, to].map(|end| multiples[end.slot]), takes_end);
+            let extrapolation = extrapolate.then(|| Box::new(line()));
+            let (ids, numbers) = (Vec::new(), Vec::new());
+            links.push(Link { from: from.slot, to: to.slot, order, ids, numbers, extrapolation });
+            links.len() - 1
+        });
+        let link = &mut links[k];
+        let n = link.count();
+        link.ids.insert(n, from.describe(instances).id);
+        link.ids.push(to.describe(instances).id);
+        // from the last place on, as each moves what is behind it
+        link.numbers.push(conversion.1);
+        link.numbers.insert(2 * n, conversion.0);
+        link.numbers.insert(n, 0.0);
     }
 }
 
@@ -341,6 +446,9 @@ fn check(
     let Connection { factor, offset, convert, .. } = *connection;
     let takes_factor = matches!(a.value_type, ValueType::F64 | ValueType::F32)
         || discrete::is_whole(a.value_type) && !mapped;
+    if connection.extrapolate && a.value_type != ValueType::F64 {
+        return Err(format!("`{from_name}` is no number of 64 bits: it cannot be extrapolated"));
+    }
     if (factor, offset) != (1.0, 0.0) && !takes_factor {
         return Err(format!("`{from_name}` is of a type that takes neither `factor` nor `offset`"));
     }
@@ -353,26 +461,4 @@ fn check(
         format!("`{from_name}` is in {} and `{to_name}` in {}: these cannot be connected", a.unit, b.unit)
     })?;
     Ok((factor * conversion.0, factor * conversion.1 + offset))
-}
-
-fn add(
-    links: &mut Vec<Link>,
-    instances: &[Instance],
-    from: VariableRef,
-    to: VariableRef,
-    conversion: (f64, f64),
-) {
-    let position = links.iter().position(|l| l.from == from.slot && l.to == to.slot);
-    let k = position.unwrap_or_else(|| {
-        links.push(Link { from: from.slot, to: to.slot, ids: Vec::new(), numbers: Vec::new() });
-        links.len() - 1
-    });
-    let link = &mut links[k];
-    let n = link.count();
-    link.ids.insert(n, from.describe(instances).id);
-    link.ids.push(to.describe(instances).id);
-    // from the last place on, as each moves what is behind it
-    link.numbers.push(conversion.1);
-    link.numbers.insert(2 * n, conversion.0);
-    link.numbers.insert(n, 0.0);
 }

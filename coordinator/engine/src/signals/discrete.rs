@@ -4,6 +4,7 @@ use super::access::VariableRef;
 use super::table::Table;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::{Instance, Reply};
+use terraglue_scenario::ConnectionOrder;
 use terraglue_subsystem::{ValueType, Values, ValuesMut};
 
 /// Whole numbers up to here are exact in f64.
@@ -17,6 +18,8 @@ pub struct Discrete {
     table: Option<Table>,
     /// value_to = a·value_from + b of numbers, where that is another one.
     conversion: Option<(f64, f64)>,
+    /// Whether it may pass values within a step.
+    order: ConnectionOrder,
     value: Value,
 }
 
@@ -52,9 +55,19 @@ pub fn is_whole(value_type: ValueType) -> bool {
 
 impl Discrete {
     /// A connection whose types were found to fit.
-    pub fn new(from: VariableRef, to: VariableRef, table: Option<Table>, conversion: (f64, f64)) -> Self {
+    pub fn new(
+        [from, to]: [VariableRef; 2],
+        table: Option<Table>,
+        conversion: (f64, f64),
+        order: ConnectionOrder,
+    ) -> Self {
         let conversion = Some(conversion).filter(|c| *c != (1.0, 0.0));
-        Self { from, to, table, conversion, value: Value::Whole(0) }
+        Self { from, to, table, conversion, order, value: Value::Whole(0) }
+    }
+
+    /// Whether it may pass values within a step where that avoids a delay.
+    pub fn is_ordered(&self) -> bool {
+        self.order == ConnectionOrder::Structure
     }
 
     /// Whether values change on their way.

@@ -23,7 +23,7 @@ pub enum Resolved {
     When(VariableRef, Comparison, f64),
 }
 
-/// What an event does.
+/// Effect of an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Due {
     /// Full name and new value.

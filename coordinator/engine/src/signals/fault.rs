@@ -34,7 +34,7 @@ struct Messages {
     modifier: Modifier,
 }
 
-/// Where a fault acts.
+/// Places of a fault.
 #[derive(Debug, Default)]
 struct Places {
     entries: Vec<Entry>,
@@ -47,7 +47,7 @@ struct Places {
 struct Own {
     variable: VariableRef,
     modifier: Modifier,
-    /// What it was set to, and what the fault made of it.
+    /// Value that was set, and the value under the fault.
     sound: f64,
     told: f64,
 }
@@ -76,7 +76,7 @@ pub struct Faults {
     all: Vec<Fault>,
 }
 
-/// What became of a fault at a communication point.
+/// Change of a fault at a communication point.
 pub type Change<'a> = (&'a str, bool);
 
 impl Faults {
@@ -121,6 +121,11 @@ impl Faults {
             })
         };
         Ok(Self { all: specs.iter().enumerate().map(one).collect::<std::result::Result<_, _>>()? })
+    }
+
+    /// Whether one changes numbers of a connection.
+    pub fn change(&self, link: usize) -> bool {
+        self.all.iter().any(|fault| fault.places.entries.iter().any(|entry| entry.link == link))
     }
 
     /// Whether there are none.
@@ -202,7 +207,7 @@ impl Faults {
     }
 }
 
-/// Where a fault of a variable acts, or why it can act nowhere.
+/// Place of a fault of a variable, or the reason why it has none.
 fn place(
     variable: VariableRef,
     links: &Links,
@@ -237,7 +242,7 @@ fn place(
     }
 }
 
-/// Where a fault of a stream acts: on those of its connections that are meant; or why it can act nowhere.
+/// Place of a fault of a stream: the connections that it names; or the reason why it has none.
 fn of_stream(
     meant: impl Fn(&StreamLink) -> bool,
     links: &Links,

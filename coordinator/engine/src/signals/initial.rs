@@ -37,7 +37,7 @@ pub fn initialize(links: &mut [Link], instances: &mut [Instance]) -> Result {
         }
         u = y;
     }
-    // What has run away is no start for Newton.
+    // A diverged iterate is no start for Newton.
     newton(links, instances, start)
 }
 

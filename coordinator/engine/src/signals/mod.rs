@@ -1,11 +1,12 @@
-//! What flows between subsystems besides glue: connections between variables, and the time line of events that
-//! set variables or call actions. What breaks in a subsystem is an event; what is wrong with a number on its way is a
-//! fault of its own kind.
+//! Values between subsystems besides glue: connections between variables, and the time line of events that set
+//! variables or call actions. A failure in a subsystem is an event; an error of a number on its way is a fault of its
+//! own kind.
 
 mod access;
 mod connection;
 mod discrete;
 mod event;
+mod extrapolation;
 mod fault;
 mod initial;
 mod modifier;
@@ -18,6 +19,7 @@ pub use access::{Directory, VariableRef, streams};
 pub use connection::{Link, Links, connect};
 pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
+pub use extrapolation::{Moment, held};
 pub use fault::Faults;
 pub use initial::initialize;
 pub use stream_link::StreamLink;

@@ -1,4 +1,4 @@
-//! What a fault does to one number: pure, and the same for the same seed and time however often it is asked.
+//! Effect of a fault on one number: pure, and the same for the same seed and time in every call.
 
 use std::collections::VecDeque;
 use terraglue_gluing::memory::{Recall, Remember};
@@ -18,7 +18,7 @@ pub struct Modifier {
     past: VecDeque<(f64, f64)>,
 }
 
-/// What becomes of a message of a stream.
+/// Fate of a message of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// It arrives.
@@ -80,7 +80,7 @@ impl Modifier {
         matches!(self.kind, FaultKind::Freeze | FaultKind::DropOut(_))
     }
 
-    /// What becomes of a message that is on its way at time t under the fault. One that is on its way when a freeze begins
+    /// Fate of a message that is on its way at time t under the fault. One that is on its way when a freeze begins
     /// still arrives, as the number of that time does.
     pub fn fate(&self, t: f64) -> Fate {
         match self.kind {
@@ -122,7 +122,7 @@ impl Modifier {
     }
 }
 
-/// What two times may differ by that are the same, s.
+/// Tolerance within which two times are the same, s.
 fn slack(t: f64) -> f64 {
     1e-12 + 8.0 * f64::EPSILON * t.abs()
 }

@@ -28,7 +28,7 @@ pub fn matches(pattern: &str, name: &str) -> bool {
     captures(pattern, name).is_some()
 }
 
-/// What each `*` of the pattern matches, shortest first from the left.
+/// Text that each `*` of the pattern matches, shortest first from the left.
 pub fn captures<'a>(pattern: &str, name: &'a str) -> Option<Vec<&'a str>> {
     let mut captured = Vec::new();
     let mut parts = name.split('.');

@@ -116,6 +116,9 @@ pub fn check(
     if v.value_type != ValueType::Binary || v.causality != Causality::Input {
         return Err(format!("`{name}` is a stream and `{target}` no input of bytes (type binary)"));
     }
+    if connection.extrapolate {
+        return Err(format!("`{name}` is a stream: it cannot be extrapolated"));
+    }
     if !connection.map.is_empty() || (connection.factor, connection.offset) != (1.0, 0.0) {
         return Err(format!("`{name}` is a stream: it takes neither `map` nor `factor` and `offset`"));
     }

@@ -2,7 +2,7 @@
 //! variables are found.
 
 use super::fault::Change;
-use super::{Directory, Faults, Link, Links, TimeLine, initialize};
+use super::{Directory, Faults, Link, Links, Moment, TimeLine, initialize};
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::Recall;
 use terraglue_host::Instance;
@@ -53,21 +53,23 @@ impl Signals {
         Ok(())
     }
 
-    /// Outputs of t become inputs of the step of length h, with what is wrong with them on their way; `tell` hears of faults that begin
+    /// Outputs of t become inputs of the step, with what is wrong with them on their way; `tell` hears of faults that begin
     /// or end.
     ///
     /// # Errors
     /// As of [`Signals::read`] and [`Signals::write`], or an input that does not take what a fault makes of it.
     pub fn transfer(
         &mut self,
-        (t, h): (f64, f64),
+        moment: Moment,
+        step_s: f64,
         instances: &mut [Instance],
         tell: impl FnMut(Change),
     ) -> Result {
         self.read(instances)?;
         if !self.faults.is_empty() {
-            self.faults.apply((t, h), &mut self.links, instances, tell)?;
+            self.faults.apply((moment.t, step_s), &mut self.links, instances, tell)?;
         }
+        self.links.numbers.iter_mut().for_each(|link| link.extrapolate(moment));
         self.write(instances)
     }
 
@@ -88,7 +90,7 @@ impl Signals {
     /// A value that a module refuses.
     pub fn write(&mut self, instances: &mut [Instance]) -> Result {
         for link in &self.links.numbers {
-            link.pass_on(instances)?;
+            link.pass_on_ahead(instances)?;
         }
         self.links.discrete.iter().try_for_each(|l| l.pass_on(instances))?;
         self.links.streams.iter_mut().try_for_each(|l| l.pass_on(instances))
@@ -98,6 +100,7 @@ impl Signals {
     pub fn remember(&self) -> Vec<u64> {
         let mut out = self.faults.remember();
         self.links.streams.iter().for_each(|link| link.remember(&mut out));
+        self.links.numbers.iter().for_each(|link| link.remember(&mut out));
         out
     }
 
@@ -105,5 +108,6 @@ impl Signals {
     pub fn recall(&mut self, kept: &mut Recall) {
         self.faults.recall(kept);
         self.links.streams.iter_mut().for_each(|link| link.recall(kept));
+        self.links.numbers.iter_mut().for_each(|link| link.recall(kept));
     }
 }

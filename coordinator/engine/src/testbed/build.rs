@@ -1,12 +1,14 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
-use super::checks::{check_groups, check_report};
+use super::checks::{check_groups, check_report, gap_words};
 use super::glued::GluedGroups;
 use super::group::Group;
+use super::loops::{Loops, NO_LOOP};
 use super::pieces;
 use super::run_clock::RunClock;
 use super::schedule::StepSchedule;
 use super::sight::{Sight, check_mount};
+use super::step_order::StepOrder;
 use super::streams::Streams;
 use super::subsystems::{Member, Subsystems};
 use super::uncoupled::Uncoupled;
@@ -66,6 +68,7 @@ impl Testbed {
         let services = services(scenario, options, true)?;
         let terrain = services.terrain.clone();
         let services = change(services);
+        let services = with_loop_state(services);
         advise(scenario);
         let instances = instantiate(scenario, options, library, &services)?;
         let mut signals = signals(scenario, &instances)?;
@@ -87,15 +90,19 @@ impl Testbed {
         if let Err(Error::Simulation { message, .. }) =
             glued.detect_contacts(0.0, scenario.time.step_s, &subsystems)
         {
-            let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
-            return Err(InputError::plain(format!("at the start: {message}"), Some(help.into())).into());
+            return Err(InputError::plain(format!("at the start: {message}"), Some(SET_DOWN.into())).into());
         }
         let streams = Streams::new(&subsystems.instances);
+        let Subsystems { instances, schedules, .. } = &mut subsystems;
+        let order = StepOrder::new(&signals.links, &signals.faults, instances, schedules);
+        let loops =
+            Loops::new(&signals.links, &signals.faults, instances, schedules, (&order, services.slots - 1))
+                .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
         Ok(Self {
             exact: takes_parts(scenario, &subsystems.instances),
             subsystems,
             glued,
-            uncoupled: Uncoupled::new(services.workers.clone()),
+            uncoupled: Uncoupled::new(services.workers.clone(), order, loops),
             signals,
             sight,
             streams,
@@ -126,7 +133,8 @@ fn advise(scenario: &Scenario) {
 fn signals(scenario: &Scenario, instances: &[Instance]) -> Result<Signals> {
     let source = &scenario.source;
     let directory = Directory::new(instances);
-    let links = signals::connect(&scenario.connections, &directory, instances, source)?;
+    let multiples: Vec<u32> = scenario.subsystems.iter().map(|spec| spec.step_multiple.max(1)).collect();
+    let links = signals::connect(&scenario.connections, &directory, instances, &multiples, source)?;
     let time_line = TimeLine::new(&scenario.events, &directory, instances, source)?;
     let random = (scenario.world.seed, scenario.time.step_s);
     let faults = Faults::new(&scenario.faults, &links, &directory, instances, source, random)?;
@@ -159,7 +167,15 @@ fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
     scenario.subsystems.iter().all(|s| s.step_multiple <= 1) && instances.iter().all(any)
 }
 
-/// What instances of a scenario are offered; `ground`: with the terrain, where it has one.
+/// With one more state to keep, the last one, for loops of connections.
+fn with_loop_state(services: HostServices) -> HostServices {
+    HostServices { slots: services.slots + 1, ..services }
+}
+
+/// The way out of a body that stands wrong at the start.
+const SET_DOWN: &str =
+    "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
+/// Services for instances of a scenario; `ground`: with the terrain, if it has one.
 ///
 /// # Errors
 /// [`Error::Input`]: the terrain of the scenario cannot be made.
@@ -180,7 +196,7 @@ pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<
     })
 }
 
-/// What is wrong with the ground, at the key that it is about. An elevation file has places of its own.
+/// Error of the ground, at the key that it is about. An elevation file has places of its own.
 fn of_terrain(scenario: &Scenario, error: Error) -> Error {
     match error {
         Error::Input(wrong) if wrong.span.is_none() => {
@@ -348,7 +364,7 @@ fn fmu(
     };
     let made = made.map_err(|e| -> Error {
         match e {
-            // What it did, not what was written about it.
+            // The error itself, not its log lines.
             terraglue_subsystem::Error::Fatal(message) => Error::Module {
                 subsystem: spec.name.clone(),
                 module: spec.module.clone(),
@@ -365,7 +381,7 @@ fn fmu(
     Ok(Instance::new(&spec.name, &spec.module, Kind::Controller, made))
 }
 
-/// What to do where a module is not found.
+/// Hint if a module is not found.
 const NO_MODULE: &str = "`terraglue modules` lists those that are found. `cargo build` makes those of the project beside the \
                          program, `cargo xtask install PREFIX` installs them with it; --module-path DIR or \
                          TERRAGLUE_MODULE_PATH adds a folder, and `module` may be the path of a file";
@@ -400,6 +416,7 @@ fn member(instance: &Instance) -> Member {
 fn schedules(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<StepSchedule> {
     let glued = |slot| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
     let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| StepSchedule {
+        level: 0,
         step_multiple: spec.step_multiple.max(1),
         glued: glued(slot),
         holds: false,
@@ -613,11 +630,37 @@ fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
             None
         });
         let (mask, turning, soil) = (spec.mask, spec.turning, soil_at(1));
-        let (damping, contact) = (spec.damping, spec.contact);
-        glue.push(Recipe { number, ends, at, mask, axes, turning, law, damping, contact, soil });
+        let (damping, contact, ramp_s) = (spec.damping, spec.contact, spec.ramp_s);
+        let recipe = Recipe { number, ends, at, mask, axes, turning, law, damping, ramp_s, contact, soil };
+        if let Some(gap_m) = gap_at_start(&recipe, &states) {
+            let (message, help) = gap_words(&spec.sides, gap_m);
+            return Err(wrong(spec, &[&spec.sides[1]], message, Some(help)));
+        }
+        glue.push(recipe);
     }
     Ok(glue)
 }
+
+/// How far the points of a joint without compliance and ramp lie apart at the start along the components that it glues, m; none:
+/// by rounding only.
+fn gap_at_start(recipe: &Recipe, states: &[Vec<BodyState>]) -> Option<f64> {
+    if recipe.contact || recipe.law.compliance > 0.0 || recipe.ramp_s > 0.0 || recipe.at.is_some() {
+        return None;
+    }
+    let place = |e: usize| {
+        let state = recipe.ends[e].map_or(BodyState::REST, |(slot, body)| states[slot][body as usize]);
+        state.world_from_body.position
+    };
+    let [a, b] = [place(0), place(1)];
+    let along = |axis: usize| (0..3).map(|k| recipe.axes[3 * axis + k] * (a[k] - b[k])).sum::<f64>();
+    let glued = (0..3).filter(|axis| recipe.mask & (1 << axis) != 0);
+    let gap = glued.map(|axis| along(axis).powi(2)).sum::<f64>().sqrt();
+    let scale = a.iter().chain(&b).fold(1.0_f64, |m, x| m.max(x.abs()));
+    (gap > GAP * scale).then_some(gap)
+}
+
+/// Gap at the start that is rounding, as a share of the places of the two bodies, or in m where these are below 1 m.
+const GAP: f64 = 1e-6;
 
 /// n along a vector and two tangents: the first in the plane of n and x where that exists.
 fn axes(normal: [f64; 3]) -> [f64; 9] {

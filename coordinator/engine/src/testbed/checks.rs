@@ -1,12 +1,12 @@
-//! What a scenario asks of its subsystems together that they cannot do, found before the first step.
+//! Demands of a scenario on its subsystems together that they cannot meet, found before the first step.
 
 use super::group::Group;
 use crate::signals::Directory;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_scenario::Scenario;
+use terraglue_scenario::{PageSpec, Scenario};
 
-/// What the members of groups cannot do.
+/// Refuses groups whose members lack a capability.
 ///
 /// # Errors
 /// A member is an FMU although the run settles before t = 0, or makes a step of its own length.
@@ -31,7 +31,7 @@ fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance])
     Err(scenario.source.error_at_value(&["time", "settle_s"], message, help).into())
 }
 
-/// What is glued makes every step together: a wrench at a port holds for one step of both sides.
+/// Glued subsystems make every step together: a wrench at a port holds for one step of both sides.
 fn check_multiples(scenario: &Scenario, groups: &[Group]) -> Result {
     let glued = |slot: usize| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
     let mut slower = scenario.subsystems.iter().enumerate().filter(|(_, spec)| spec.step_multiple > 1);
@@ -51,11 +51,30 @@ fn check_multiples(scenario: &Scenario, groups: &[Group]) -> Result {
     Err(scenario.source.error_at_value(&[name, "step_multiple"], message, Some(help)).into())
 }
 
-/// The names that the report speaks of must exist.
+/// The variables that the page plots must exist, and what it selects must have some.
+fn check_page(scenario: &Scenario, directory: &Directory) -> Result {
+    let (source, page) = (&scenario.source, &scenario.page);
+    let mut plotted = page.plots.iter().flat_map(|plot| PageSpec::variables(plot));
+    if let Some(name) = plotted.find(|name| directory.find(name).is_none()) {
+        let message = format!("variable `{name}` does not exist");
+        return Err(source.error_at_value(&["page", "plots"], message, directory.hint(name)).into());
+    }
+    if let Some(part) = &page.select {
+        let below = format!("{part}.");
+        if !directory.names().iter().any(|name| name == part || name.starts_with(&below)) {
+            let message = format!("`{part}` is no variable, and no part that has some");
+            return Err(source.error_at_value(&["page", "select"], message, directory.hint(part)).into());
+        }
+    }
+    Ok(())
+}
+
+/// The names that report and page speak of must exist.
 ///
 /// # Errors
 /// One does not.
 pub fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Instance]) -> Result {
+    check_page(scenario, directory)?;
     let source = &scenario.source;
     if let Some(name) = &scenario.report.commanded_speed
         && directory.find(name).is_none()
@@ -84,4 +103,15 @@ pub fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Ins
         }
     }
     Ok(())
+}
+
+/// What is wrong with a joint whose points are so far apart, and the way out.
+pub(super) fn gap_words([a, b]: &[String; 2], gap_m: f64) -> (String, String) {
+    let gap = if gap_m < 1e-3 { format!("{gap_m:.2e}") } else { format!("{gap_m:.4}") };
+    let message = format!(
+        "glue: `{a}` and `{b}` are {gap} m apart along what the joint glues; the first step would close this gap at once"
+    );
+    let help = "move one of the two bodies there, glue one point of both with `at_m = [x, y, z]`, or close the gap slowly with \
+                `ramp_s = 0.5`";
+    (message, help.into())
 }

@@ -1,18 +1,20 @@
-//! How values go round in a run: the order of the exchange, what every connection does and how late it is, loops.
+//! Flow of values in a run: the order of the exchange, effect and delay of every connection, loops.
 
 use super::Testbed;
 use super::group::Group;
+use super::loops::Loops;
 use super::schedule::StepSchedule;
+use super::step_order::StepOrder;
 use crate::signals::{Links, VariableRef, streams};
 use serde::{Deserialize, Serialize};
 use terraglue_host::Instance;
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::Capabilities;
 
-/// What `terraglue run --explain` prints and the report shows; nothing in it was measured.
+/// Output of `terraglue run --explain`, also shown in the report; nothing in it was measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Explanation {
-    /// What is done in a step, in this order.
+    /// Parts of a step, in this order.
     pub order: Vec<String>,
     /// All connections.
     pub connections: Vec<ConnectionNote>,
@@ -27,7 +29,7 @@ pub struct ConnectionNote {
     pub from: String,
     /// Full name of the input.
     pub to: String,
-    /// What becomes of a value x, with units.
+    /// Result for a value x, with units.
     pub value: String,
     /// Steps from when a value holds to the end of the step that it acts on.
     pub delay: String,
@@ -43,6 +45,8 @@ impl Testbed {
             links: &self.signals.links,
             schedules: &self.subsystems.schedules,
             groups: &self.glued.groups,
+            order: self.uncoupled.order(),
+            loops: self.uncoupled.loops(),
         };
         let ends = sight.ends();
         Explanation {
@@ -53,29 +57,45 @@ impl Testbed {
     }
 }
 
-/// What an explanation is made of.
+/// Data of an explanation.
 struct Sight<'a> {
     instances: &'a [Instance],
     links: &'a Links,
     schedules: &'a [StepSchedule],
     groups: &'a [Group],
+    order: &'a StepOrder,
+    loops: &'a Loops,
 }
 
 impl Sight<'_> {
     fn ends(&self) -> Vec<ConnectionEnds> {
-        let numbers = self.links.numbers.iter().flat_map(|link| {
-            link.ends().map(|([from, to], conversion)| ConnectionEnds {
+        let numbers = self.links.numbers.iter().enumerate().flat_map(|(k, link)| {
+            let passes = match () {
+                () if self.order.is_within(k) => Passes::AtEnd,
+                () if self.loops.has(k) => Passes::Repeatedly,
+                () if link.is_extrapolated() => Passes::AlongLine,
+                () => Passes::AtStart,
+            };
+            link.ends().map(move |([from, to], conversion)| ConnectionEnds {
                 from,
                 to,
                 conversion: Some(conversion),
                 by_table: false,
                 stream: false,
+                passes,
             })
         });
         let variable = |at: VariableRef| (at.slot, at.describe(self.instances).id);
-        let discrete = self.links.discrete.iter().map(|d| {
+        let discrete = self.links.discrete.iter().enumerate().map(|(k, d)| {
             let [from, to] = d.ends().map(variable);
-            ConnectionEnds { from, to, conversion: d.conversion(), by_table: d.has_table(), stream: false }
+            ConnectionEnds {
+                from,
+                to,
+                conversion: d.conversion(),
+                by_table: d.has_table(),
+                stream: false,
+                passes: if self.order.is_discrete_within(k) { Passes::AtEnd } else { Passes::AtStart },
+            }
         });
         let places: Vec<_> = streams(self.instances).map(|(_, place)| place).collect();
         let messages = self.links.streams.iter().map(|l| {
@@ -86,6 +106,7 @@ impl Sight<'_> {
                 conversion: None,
                 by_table: false,
                 stream: true,
+                passes: Passes::AtStart,
             }
         });
         numbers.chain(discrete).chain(messages).collect()
@@ -115,7 +136,8 @@ impl Sight<'_> {
                 list(&to)
             ));
         }
-        let alone = self.instances.iter().zip(self.schedules).filter(|(_, turn)| !turn.glued);
+        let first = |(_, turn): &(&Instance, &StepSchedule)| !turn.glued && turn.level == 0;
+        let alone = self.instances.iter().zip(self.schedules).filter(first);
         let alone: Vec<String> = alone
             .map(|(instance, turn)| match turn.step_multiple {
                 1 => instance.name().to_owned(),
@@ -124,6 +146,11 @@ impl Sight<'_> {
             .collect();
         if !alone.is_empty() {
             order.push(format!("a step of each subsystem without glue, in any order: {}", alone.join(", ")));
+        }
+        for level in 1..self.order.levels() {
+            let follows = self.schedules.iter().enumerate().filter(|(_, turn)| turn.level as usize == level);
+            let follows: Vec<&str> = follows.map(|(slot, _)| name(slot)).collect();
+            order.push(format!("then a step of those that take outputs of its end: {}", follows.join(", ")));
         }
         for group in self.groups {
             let members: Vec<&str> = group.problem.members().map(name).collect();
@@ -159,9 +186,23 @@ impl Sight<'_> {
             Some((a, 0.0)) => format!("{a}·x"),
             Some((a, b)) => format!("{a}·x + {b}"),
         };
-        let (delay, why) = match self.schedules[end.from.0].step_multiple {
-            1 => ("1".to_owned(), "read at the start of a step and held to its end".to_owned()),
-            n => (
+        let (delay, why) = match (end.passes, self.schedules[end.from.0].step_multiple) {
+            (Passes::Repeatedly, _) => (
+                "0".to_owned(),
+                "source and target repeat the step until the value at its end is the one that it was made with".to_owned(),
+            ),
+            (Passes::AtEnd, _) => (
+                "0".to_owned(),
+                "its target is stepped after its source, with the output at the end of the step".to_owned(),
+            ),
+            (Passes::AlongLine, n) => (
+                n.to_string(),
+                "read at the start of a step; the input follows the line through the last two values".to_owned(),
+            ),
+            (Passes::AtStart, 1) => {
+                ("1".to_owned(), "read at the start of a step and held to its end".to_owned())
+            }
+            (Passes::AtStart, n) => (
                 format!("1 to {n}"),
                 format!("its source makes one step of {n}, and the value is held between"),
             ),
@@ -202,9 +243,15 @@ impl Sight<'_> {
         (0..count)
             .filter(first)
             .map(|k| {
-                let members = (0..count).filter(|j| all[k][*j] && all[*j][k]);
+                let is_member = |j: usize| all[k][j] && all[j][k];
+                let members = (0..count).filter(|j| is_member(*j));
                 let names: Vec<&str> = members.map(|j| self.instances[j].name()).collect();
-                format!("{}: explicit, every connection in it is one step late", names.join(" ⇄ "))
+                let mut inside = ends.iter().filter(|e| is_member(e.from.0) && is_member(e.to.0));
+                let how = match inside.all(|e| matches!(e.passes, Passes::Repeatedly | Passes::AtEnd)) {
+                    true => "solved in every step, which its members repeat",
+                    false => "explicit, a connection in it is one step late",
+                };
+                format!("{}: {how}", names.join(" ⇄ "))
             })
             .collect()
     }
@@ -218,6 +265,20 @@ struct ConnectionEnds {
     by_table: bool,
     /// Whether `from` is the number of a stream.
     stream: bool,
+    passes: Passes,
+}
+
+/// When within a step a connection passes its values.
+#[derive(Clone, Copy)]
+enum Passes {
+    /// Read at its start, and held.
+    AtStart,
+    /// Read at its start; the input follows a line.
+    AlongLine,
+    /// Read at its end, by a target that is stepped later.
+    AtEnd,
+    /// The step is repeated until they stand.
+    Repeatedly,
 }
 
 impl Explanation {

@@ -1,4 +1,4 @@
-//! What is glued in a run: contact detection, the groups with their strategies, and the control of the length of steps.
+//! Glue of a run: contact detection, the groups with their strategies, and the control of the length of steps.
 
 use super::group::Group;
 use super::run_clock::RunClock;
@@ -27,7 +27,7 @@ pub(super) struct GluedGroups {
     pub failed: &'static str,
     /// Gravity of the world, m/s².
     pub gravity: [f64; 3],
-    /// How far before contact a port is made, m.
+    /// Distance before contact at which a port is made, m.
     pub contact_margin_m: f64,
 }
 
@@ -71,7 +71,7 @@ impl GluedGroups {
         Ok(Some(sum))
     }
 
-    /// Where bodies may touch ground in a step of length h; the ports are then in the detector.
+    /// Detects possible contacts of bodies with ground in a step of length h; the ports are then in the detector.
     pub fn detect_contacts(&mut self, t: f64, h: f64, subsystems: &Subsystems) -> Result {
         let now = Now { t, h, gravity: self.gravity, margin: self.contact_margin_m };
         let Subsystems { members, instances, .. } = subsystems;
@@ -185,7 +185,8 @@ impl GluedGroups {
         Ok(())
     }
 
-    /// What each group, signals and streams (given), contact detection and the control of the steps keep from step to step.
+    /// Memory of each group, signals and streams (given), contact detection and the control of the steps from step to
+    /// step.
     pub fn memory(&self, signals: Vec<u64>, streams: Vec<u64>) -> Vec<Vec<u64>> {
         let mut all: Vec<Vec<u64>> = self.groups.iter().map(Group::memory).collect();
         all.push(signals);

@@ -17,11 +17,11 @@ pub(super) struct Group {
     pub strategy: Box<dyn Strategy>,
     /// Its own strategy, where the scenario's glue names one.
     pub own: Option<StrategyKind>,
-    /// What finds the forces of joints at the start, where there are any.
+    /// Strategy for the forces of joints at the start, if there are any.
     pub start: Option<Box<dyn Strategy>>,
     /// Keys of the ports that carried a normal force in the last step.
     pub closed: Vec<u64>,
-    /// What passed in the last step, where the control of the steps asks for it.
+    /// Passage of energy in the last step, if the control of the steps needs it.
     pub passage: Passage,
 }
 
@@ -49,7 +49,7 @@ impl Group {
         timings: &mut Timings,
     ) -> Result {
         let start = Clock::now();
-        self.problem.glue.place(|slot, body| members[slot].states[body as usize]);
+        self.problem.glue.place(at.t + at.h, |slot, body| members[slot].states[body as usize]);
         self.problem.begin(at, found);
         timings.charge(Part::Contact, start);
         self.problem.set_ports(instances)
@@ -127,7 +127,7 @@ impl Group {
         }
     }
 
-    /// What later steps depend on beside the members' own states.
+    /// State on which later steps depend beside the members' own states.
     pub fn memory(&self) -> Vec<u64> {
         let mut out = vec![self.closed.len() as u64];
         out.extend(&self.closed);

@@ -86,7 +86,7 @@ impl Testbed {
     }
 }
 
-/// What is counted of an energy ledger, bit by bit.
+/// Counted parts of an energy ledger, bit by bit.
 fn before_bits(e: &Energy) -> [u64; 4] {
     [e.dissipated, e.port_work, e.actuator_work, e.electrical].map(f64::to_bits)
 }

@@ -18,7 +18,7 @@ impl Testbed {
         self.events.push(Event { t_s: self.clock.t, what });
     }
 
-    /// Where errors of instances at their end are kept.
+    /// Errors of instances at their end.
     pub fn teardown_errors(&self) -> TeardownErrors {
         self.teardown_errors.clone()
     }
@@ -73,7 +73,7 @@ impl Testbed {
     }
 }
 
-/// What connections, contacts and recordings hold of an instance, and where a new one differs in it.
+/// Difference of a new instance in properties on which connections, contacts and recordings of the old one depend.
 fn misfit(old: &Instance, new: &Instance) -> Option<String> {
     if old.kind() != new.kind() {
         return Some("it is of another kind now; start the run again".into());

@@ -6,7 +6,7 @@ use terraglue_subsystem::Energy;
 /// The least part of a step that counts as time left.
 const SPLINTER: f64 = 1e-6;
 
-/// What a testbed knows of its time.
+/// Time of a testbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RunClock {
     /// Length of a nominal step, s.

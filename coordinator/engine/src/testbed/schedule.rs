@@ -11,6 +11,8 @@ pub(super) struct Span {
     pub end: f64,
     pub nominal: u64,
     pub step_s: f64,
+    /// Level of the subsystems whose trials are made now.
+    pub level: u32,
     /// Whether a trial ended otherwise than at t + h.
     pub broken: AtomicBool,
 }
@@ -19,13 +21,15 @@ pub(super) struct Span {
 pub(super) struct StepSchedule {
     /// Steps of the testbed per step of this subsystem.
     pub step_multiple: u32,
+    /// Place in the order of the steps: those of a higher level take outputs of lower ones at the end of the step.
+    pub level: u32,
     /// Whether it is glued: it makes none by itself.
     pub glued: bool,
     /// Whether it makes no step now, as controllers do before the start.
     pub holds: bool,
     /// Whether it has bodies, whose states are read after every step.
     pub has_bodies: bool,
-    /// How its last trial ended where that was not at t + h.
+    /// End of its last trial if that was not at t + h.
     pub trial: Option<Box<Result<Progress>>>,
 }
 
@@ -33,6 +37,9 @@ impl StepSchedule {
     /// Its trial of this step, if it makes one.
     #[inline]
     pub fn try_alone(&mut self, instance: &mut Instance, span: &Span, out: &mut Response) {
+        if self.level != span.level {
+            return;
+        }
         let none = Input::Force { t: &[], motion: None };
         let broken = self.own_step(span, |step| match instance.advance(step, &none, out) {
             Ok(Progress::Complete) => None,

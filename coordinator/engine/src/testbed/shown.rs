@@ -7,7 +7,7 @@ use terraglue_subsystem::{
 };
 use terraglue_world::WorldModel;
 
-/// What `observe` of an instance gets.
+/// Arguments of `observe` of an instance.
 pub(super) struct Shown<'a> {
     model: &'a WorldModel,
     before: &'a [Instance],

@@ -1,6 +1,6 @@
 //! Sight: after every step the committed world is shown to the subsystems that see.
 //!
-//! Where nobody sees there is no world, and a step costs nothing for it.
+//! If no subsystem has sight there is no world, and a step costs nothing for it.
 
 use super::run_clock::RunClock;
 use super::schedule::Span;
@@ -33,7 +33,7 @@ struct Open {
     before: Vec<(usize, Vec<BodyState>)>,
 }
 
-/// What the world says that is wrong with a scene.
+/// Error of the world about a scene.
 fn odd(error: &terraglue_world::Error) -> Error {
     InputError::plain(format!("what can be seen: {error}"), None).into()
 }

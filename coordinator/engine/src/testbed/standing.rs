@@ -17,7 +17,7 @@ impl Testbed {
     /// Makes the steps before t = 0 that `time.settle_s` asks for. Once; the first step does it at the latest.
     ///
     /// # Errors
-    /// What a step before the start runs into; its time is negative.
+    /// Errors of a step before the start; its time is negative.
     pub fn begin(&mut self) -> Result {
         if self.clock.started || self.clock.index > 0 || self.clock.t != 0.0 {
             return Ok(());
@@ -94,7 +94,7 @@ impl Testbed {
     }
 }
 
-/// What has come in and gone out since a state whose ledger says `before`.
+/// Energy exchanged since a state with the ledger `before`.
 pub(super) fn since(before: &Energy, now: Energy) -> Energy {
     Energy {
         dissipated: now.dissipated - before.dissipated,

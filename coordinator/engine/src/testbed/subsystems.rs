@@ -9,7 +9,7 @@ use terraglue_subsystem::BodyState;
 /// Action of a module that begins to count work and heat afresh.
 const RESTART: &str = "energy.restart";
 
-/// What the coordinator knows of an instance beside the instance itself.
+/// Data of the coordinator on an instance beside the instance itself.
 #[derive(Debug)]
 pub(super) struct Member {
     /// Committed states of its bodies.
@@ -35,7 +35,7 @@ impl Subsystems {
         Ok(())
     }
 
-    /// What the steps of a subsystem have cost. Without glue: the steps that were watched, times the steps that each stands
+    /// Cost of the steps of a subsystem. Without glue: the steps that were watched, times the steps that each stands
     /// for; with glue: all calls in a step.
     pub fn cost(&self, slot: usize) -> Duration {
         match self.schedules[slot].glued {

@@ -2,12 +2,16 @@
 //!
 //! Their trials see committed values only, so the order, and the thread that runs one, cannot be seen in any result.
 //! Every 64th step runs one after the other under a watch: it measures what each costs, and whether threads gain.
+//! FMUs that take outputs of others within the step follow in the order of [`StepOrder`].
 
+use super::loops::Loops;
 use super::run_clock::RunClock;
 use super::schedule::{Span, StepSchedule};
+use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
+use crate::signals::Links;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::Result;
 use terraglue_host::{Instance, Progress, Workers};
@@ -17,19 +21,31 @@ use terraglue_subsystem::{Motion, Response, Step};
 const SAMPLED: u64 = 64;
 /// The first one to be watched; what is made at the first step of all is no example.
 const FIRST: u64 = 1;
-/// What threads must save in a step before they are woken: several times what waking costs.
+/// Time that threads must save in a step before they are woken: several times the cost of waking.
 const WORTH: Duration = Duration::from_micros(20);
 
 /// Whether trials run beside each other.
 pub(super) struct Uncoupled {
     workers: Arc<Workers>,
-    /// What threads would have saved in the last two steps that were watched.
+    /// Time that threads would have saved in the last two steps that were watched.
     saved: [Duration; 2],
+    order: StepOrder,
+    loops: Loops,
 }
 
 impl Uncoupled {
-    pub fn new(workers: Arc<Workers>) -> Self {
-        Self { workers, saved: [Duration::ZERO; 2] }
+    pub fn new(workers: Arc<Workers>, order: StepOrder, loops: Loops) -> Self {
+        Self { workers, saved: [Duration::ZERO; 2], order, loops }
+    }
+
+    /// The loops that are solved within a step.
+    pub fn loops(&self) -> &Loops {
+        &self.loops
+    }
+
+    /// The order of the steps.
+    pub fn order(&self) -> &StepOrder {
+        &self.order
     }
 
     fn pays(&self) -> bool {
@@ -41,23 +57,47 @@ impl Uncoupled {
         &mut self,
         clock: &RunClock,
         (h, end): (f64, f64),
+        links: &mut Links,
         subsystems: &mut Subsystems,
     ) -> Result<Option<String>> {
-        let span = span(clock, h, end);
-        if is_sampled(clock) {
-            self.sample(&span, subsystems);
-        } else if self.pays() {
-            let job = |instance: &mut Instance, turn: &mut StepSchedule| {
-                turn.try_alone(instance, &span, &mut nothing())
-            };
-            self.workers.for_each_pair(&mut subsystems.instances, &mut subsystems.schedules, &job);
-        } else {
-            let mut out = nothing();
-            for (instance, turn) in subsystems.instances.iter_mut().zip(&mut subsystems.schedules) {
-                turn.try_alone(instance, &span, &mut out);
+        let mut span = span(clock, h, end);
+        if !self.loops.is_empty() {
+            self.loops.begin(links, &mut subsystems.instances)?;
+        }
+        self.advance_first(clock, &span, subsystems);
+        for level in 1..self.order.levels() {
+            if span.broken.load(Ordering::Relaxed) {
+                break;
+            }
+            span.level = level as u32;
+            self.order.pass_on(level, links, &mut subsystems.instances)?;
+            if is_sampled(clock) {
+                self.sample(&span, subsystems);
+            } else {
+                one_by_one(&span, subsystems);
+            }
+        }
+        if !self.loops.is_empty() {
+            let unsolved = self.loops.solve(&self.order, &mut span, links, subsystems)?;
+            if unsolved.is_some() {
+                return Ok(unsolved);
             }
         }
         if span.broken.into_inner() { broken_trial(subsystems) } else { Ok(None) }
+    }
+
+    /// Trials of all that take outputs of the start of the step only.
+    fn advance_first(&mut self, clock: &RunClock, span: &Span, subsystems: &mut Subsystems) {
+        if is_sampled(clock) {
+            self.sample(span, subsystems);
+        } else if self.pays() {
+            let job = |instance: &mut Instance, turn: &mut StepSchedule| {
+                turn.try_alone(instance, span, &mut nothing())
+            };
+            self.workers.for_each_pair(&mut subsystems.instances, &mut subsystems.schedules, &job);
+        } else {
+            one_by_one(span, subsystems);
+        }
     }
 
     /// One after the other, each under a watch.
@@ -65,7 +105,8 @@ impl Uncoupled {
         let (mut sum, mut longest) = (Duration::ZERO, Duration::ZERO);
         let Subsystems { instances, schedules, members } = subsystems;
         let all = instances.iter_mut().zip(schedules).zip(members);
-        for ((instance, turn), member) in all.filter(|((_, turn), _)| !turn.glued) {
+        for ((instance, turn), member) in all.filter(|((_, turn), _)| !turn.glued && turn.level == span.level)
+        {
             let start = Instant::now();
             turn.try_alone(instance, span, &mut nothing());
             let took = start.elapsed();
@@ -73,9 +114,19 @@ impl Uncoupled {
             sum += took;
             longest = longest.max(took);
         }
+        if span.level > 0 {
+            return;
+        }
         let threads = self.workers.threads() as u32;
         let beside = longest.max(sum / threads);
         self.saved = [self.saved[1], sum - beside];
+    }
+}
+
+fn one_by_one(span: &Span, subsystems: &mut Subsystems) {
+    let mut out = nothing();
+    for (instance, turn) in subsystems.instances.iter_mut().zip(&mut subsystems.schedules) {
+        turn.try_alone(instance, span, &mut out);
     }
 }
 
@@ -95,10 +146,10 @@ fn is_sampled(clock: &RunClock) -> bool {
 /// The step of length h that the testbed makes now.
 pub(super) fn span(clock: &RunClock, h: f64, end: f64) -> Span {
     let step = Step::free(clock.t, h, clock.index);
-    Span { step, end, nominal: clock.nominal, step_s: clock.step_s, broken: AtomicBool::new(false) }
+    Span { step, end, nominal: clock.nominal, step_s: clock.step_s, level: 0, broken: AtomicBool::new(false) }
 }
 
-/// What the first trial says that did not end at t + h; all are forgotten.
+/// Error of the first trial that did not end at t + h; all are forgotten.
 #[cold]
 fn broken_trial(subsystems: &mut Subsystems) -> Result<Option<String>> {
     let all = subsystems.instances.iter().zip(&mut subsystems.schedules);
@@ -127,7 +178,7 @@ pub(super) fn commit(clock: &RunClock, (h, end): (f64, f64), subsystems: &mut Su
     Ok(())
 }
 
-/// What a subsystem without ports answers.
+/// Response of a subsystem without ports.
 fn nothing() -> Response<'static> {
     Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: 0.0, flags: 0 }
 }

@@ -1,18 +1,45 @@
-//! Values of single elements of arrays: FMI reads and sets whole arrays only.
+//! Values of elements of arrays: FMI reads and sets whole arrays only, so neighbours of one array pass in one call.
 
 use super::{FmuSubsystem, error};
 use terraglue_subsystem::{Result, Values, ValuesMut};
 
 impl FmuSubsystem {
-    /// Values of elements, each out of its whole array.
+    /// Runs of neighbouring numbers that belong to one array each.
+    fn runs<'a>(&'a self, ids: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
+        let reference = |id: &u32| self.places.get(*id as usize).map(|p| p.reference);
+        ids.chunk_by(move |a, b| reference(a) == reference(b))
+    }
+
+    /// Of a run: the reference of its array, its first element where the others follow in their order, and the elements of
+    /// the whole array.
+    fn array(&self, run: &[u32]) -> Result<(u32, Option<usize>, usize)> {
+        let place = *self.place(run[0])?;
+        let (first, count) = (place.element as usize, place.count as usize);
+        // numbers of the elements of an array follow each other
+        let ordered = run.windows(2).all(|w| w[0].checked_add(1) == Some(w[1])) && first + run.len() <= count;
+        Ok((place.reference, ordered.then_some(first), count))
+    }
+
+    /// Values of elements, out of their whole arrays.
     pub(super) fn get_elements(&self, ids: &[u32], out: ValuesMut) -> Result {
         macro_rules! elements {
             ($variant:ident, $out:expr, $zero:expr) => {{
-                for (id, out) in ids.iter().zip($out.iter_mut()) {
-                    let place = *self.place(*id)?;
-                    let mut whole = vec![$zero; place.count as usize];
-                    self.instance.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
-                    *out = whole.swap_remove(place.element as usize);
+                let mut whole = Vec::new();
+                let mut rest = &mut $out[..];
+                for run in self.runs(ids) {
+                    let (reference, first, count) = self.array(run)?;
+                    let (out, others) = rest.split_at_mut(run.len());
+                    rest = others;
+                    whole.resize(count, $zero);
+                    self.instance.get(&[reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    match first {
+                        Some(first) => out.clone_from_slice(&whole[first..first + run.len()]),
+                        None => {
+                            for (id, out) in run.iter().zip(out) {
+                                *out = whole[self.place(*id)?.element as usize].clone();
+                            }
+                        }
+                    }
                 }
                 Ok(())
             }};
@@ -41,16 +68,26 @@ impl FmuSubsystem {
         }
     }
 
-    /// New values of elements; the others of their arrays stay.
+    /// New values of elements; the others of their arrays stay. An array whose elements all come is set in one call.
     pub(super) fn set_elements(&mut self, ids: &[u32], values: Values) -> Result {
         macro_rules! elements {
             ($variant:ident, $values:expr, $zero:expr) => {{
-                for (id, value) in ids.iter().zip($values) {
-                    let place = *self.place(*id)?;
-                    let mut whole = vec![$zero; place.count as usize];
-                    self.instance.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
-                    whole[place.element as usize] = value.clone();
-                    self.instance.set(&[place.reference], Values::$variant(&whole)).map_err(error)?;
+                let mut whole = Vec::new();
+                let mut rest = $values;
+                for run in self.runs(ids) {
+                    let (reference, first, count) = self.array(run)?;
+                    let (own, others) = rest.split_at(run.len());
+                    rest = others;
+                    if first == Some(0) && own.len() == count {
+                        self.instance.set(&[reference], Values::$variant(own)).map_err(error)?;
+                        continue;
+                    }
+                    whole.resize(count, $zero);
+                    self.instance.get(&[reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    for (id, value) in run.iter().zip(own) {
+                        whole[self.place(*id)?.element as usize] = value.clone();
+                    }
+                    self.instance.set(&[reference], Values::$variant(&whole)).map_err(error)?;
                 }
                 Ok(())
             }};

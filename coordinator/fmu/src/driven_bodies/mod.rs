@@ -8,7 +8,7 @@ mod settings;
 mod values;
 
 use motion::DrivenBody;
-use settings::DrivenBodiesSettings;
+pub(crate) use settings::{DrivenBodiesSettings, schema};
 use std::sync::Arc;
 use terraglue_subsystem::{
     BodyState, Capabilities, Config, Energy, Error, Estimate, Host, Input, Level, Module, Motion, Response,

@@ -1,14 +1,21 @@
 //! Collects everything that a scenario needs, lays it out as an FMU and packs it.
 
 use super::{ExportSettings, Request, SCENARIO, SETTINGS, open, page, place, wrap};
+use crate::driven_bodies::{self, DrivenBodiesSettings};
+use crate::references;
+use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::testbed::{Options, Testbed};
-use terraglue_fmi::Version;
-use terraglue_fmi::export::{About, Content, Mailbox, Opened, Opening, describe, identifier, pack};
+use terraglue_fmi::elf::needed_glibc;
+use terraglue_fmi::export::{
+    About, Compression, Content, Mailbox, Opened, Opening, describe, identifier, pack,
+};
+use terraglue_fmi::{Fmu, Version};
 use terraglue_host::SearchPath;
 use terraglue_scenario::{InputError, Scenario, SubsystemSpec, find_soil_table};
-use terraglue_subsystem::{Capabilities, ParameterType};
+use terraglue_subsystem::{Capabilities, Config, ParameterType};
 use toml_edit::{DocumentMut, Item, value};
 
 /// What was written.
@@ -20,6 +27,10 @@ pub struct Exported {
     pub variables: usize,
     /// Whether its state can be saved and restored, and whether it can be serialised.
     pub states: [bool; 2],
+    /// Why it brings no results of its first steps with it, where it was to.
+    pub unproved: Option<String>,
+    /// The oldest glibc that its library runs with, as `2.34`: that of the machine that built it, or older.
+    pub glibc: Option<String>,
     /// Names that the version of the standard has no type for.
     pub left_out: Vec<String>,
 }
@@ -58,16 +69,56 @@ pub fn write(request: &Request) -> Result<Exported> {
     let opening = Opening { name: "export".into(), resources: resources.clone(), log: Mailbox::default() };
     let opened = open(&opening).map_err(|message| at_home(&scenario, request, bare, message))?;
     let about = about(request, &scenario, &settings);
-    let entries = entries(request, &search, &resources, &opened, &about)?;
-    pack(&request.out, &entries).map_err(plain)?;
+    let mut entries = entries(request, &search, &resources, &opened, &about)?;
+    let unproved = match request.reference {
+        true => add_reference(&scenario, &stage.path().join("copy.fmu"), &mut entries)?,
+        false => None,
+    };
+    pack(&request.out, &entries, Compression::Deflate).map_err(plain)?;
     let can = opened.subsystem.capabilities();
     let state = can.has(Capabilities::STATE);
     Ok(Exported {
         path: request.out.clone(),
         variables: opened.layout.entries.len(),
         states: [state, state && can.has(Capabilities::SERIALIZE)],
+        unproved,
+        glibc: glibc(&entries)?,
         left_out: opened.layout.left_out(opened.subsystem.variables()).map(str::to_owned).collect(),
     })
+}
+
+/// Results of the first steps of an FMU as more of its entries; why there are none, if so. A copy that is not compressed is run for them.
+fn add_reference(
+    scenario: &Scenario,
+    copy: &Path,
+    entries: &mut Vec<(String, Content)>,
+) -> Result<Option<String>> {
+    pack(copy, entries, Compression::None).map_err(plain)?;
+    let fmu = Fmu::open(copy).map_err(|e| plain(e.to_string()))?;
+    let inputs = references::pressed(&touching(scenario)?, references::stop_s(&fmu));
+    match references::files(&fmu, &inputs, Box::new(|_| {})) {
+        Ok(files) => entries.extend(files.into_iter().map(|(path, text)| (path, Content::Text(text)))),
+        Err(error) => return Ok(Some(error.to_string())),
+    }
+    Ok(None)
+}
+
+/// Where the feet of an exported soil touch level ground at z = 0, m: at their own places, else up to sixteen of them half a metre apart.
+fn touching(scenario: &Scenario) -> Result<Vec<[f64; 3]>> {
+    let feet = |spec: &&SubsystemSpec| spec.name == "foot" && spec.module == driven_bodies::NAME;
+    let Some(feet) = scenario.subsystems.iter().find(feet) else { return Ok(Vec::new()) };
+    let json = Value::Object(feet.parameters.clone()).to_string();
+    let config = Config::parse(&json).map(|config| config.with_defaults(&driven_bodies::schema()));
+    let settings =
+        config.and_then(|config| Ok((config.numbers("position_m")?, DrivenBodiesSettings::read(&config)?)));
+    let (given, settings) = settings.map_err(|e| plain(e.to_string()))?;
+    let [_, [.., height]] = settings.shape.extent();
+    let count = settings.positions.len();
+    if given.is_empty() && count <= 16 {
+        let place = |k: usize| [(k % 4) as f64 * 0.5 - 0.75, (k / 4) as f64 * 0.5 - 0.75, height];
+        return Ok((0..count).map(place).collect());
+    }
+    Ok(given.as_chunks::<3>().0.iter().map(|[x, y, _]| [*x, *y, height]).collect())
 }
 
 /// What is wrong with a scenario, at its place where it was written and not in the copy. The scenario around a single module is no
@@ -90,7 +141,8 @@ fn plain(message: impl Into<String>) -> Error {
 /// The scenario, and the subsystem whose variables bear no prefix where it stands for one module.
 fn scenario(request: &Request) -> Result<(Scenario, Option<&'static str>)> {
     let path = Path::new(&request.target);
-    if path.extension().is_some_and(|e| e == "toml") {
+    // a scenario, or a system structure that is read as one
+    if path.extension().is_some_and(|e| ["toml", "ssp", "ssd"].iter().any(|known| e == *known)) {
         return Ok((Scenario::load(path, &request.sets)?, None));
     }
     let search = SearchPath::standard(&request.module_paths, Path::new("."));
@@ -158,8 +210,8 @@ impl Bundle<'_> {
 
     /// A parameter that is the path of a file, with the files that this one names.
     fn parameter(&mut self, spec: &SubsystemSpec, key: &str) -> Result {
-        let below = |value: &serde_json::Value, part: &str| value.get(part).cloned();
-        let all = serde_json::Value::Object(spec.parameters.clone());
+        let below = |value: &Value, part: &str| value.get(part).cloned();
+        let all = Value::Object(spec.parameters.clone());
         let given = key.split('.').try_fold(all, |value, part| below(&value, part));
         let Some(path) = given.as_ref().and_then(|v| v.as_str()) else { return Ok(()) };
         let from = self.scenario.folder.join(path);
@@ -242,17 +294,43 @@ impl Bundle<'_> {
     }
 }
 
-/// What a robot file names by `filename="…"` or `file="…"`: meshes and other files beside it.
+/// Files that a robot file needs, relative to its folder: meshes, textures and other files that it names, with those that an
+/// included file names, below the folders that MJCF sets for them.
 fn named_files(path: &Path) -> Vec<String> {
-    let Ok(text) = terraglue_subsystem::files::read_text(path) else { return Vec::new() };
-    let mut all: Vec<String> = ["filename=\"", "file=\""]
-        .iter()
-        .flat_map(|key| text.split(key).skip(1).filter_map(|rest| rest.split('"').next()))
-        .map(|name| name.strip_prefix("package://").unwrap_or(name).to_owned())
-        .collect();
-    all.sort();
-    all.dedup();
-    all
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let (mut found, mut folders) = (BTreeSet::new(), BTreeSet::from([String::new()]));
+    let mut open = vec![path.to_owned()];
+    while let Some(file) = open.pop() {
+        let Ok(text) = terraglue_subsystem::files::read_text(&file) else { continue };
+        for key in ["meshdir", "assetdir", "texturedir"] {
+            folders.extend(attributes(&text, key).map(|d| d.trim_end_matches('/').to_owned() + "/"));
+        }
+        for name in ["filename", "file"].iter().flat_map(|key| attributes(&text, key)) {
+            let name = name.strip_prefix("package://").unwrap_or(name).to_owned();
+            let below = folder.join(&name);
+            let is_text = [".xml", ".xacro", ".urdf", ".mjcf"].iter().any(|end| name.ends_with(end));
+            if is_text && below.is_file() && !found.contains(&name) {
+                open.push(below);
+            }
+            found.insert(name);
+        }
+    }
+    let placed = |name: String| {
+        let there = folders.iter().map(|f| format!("{f}{name}")).find(|path| folder.join(path).is_file());
+        there.unwrap_or(name)
+    };
+    let all: BTreeSet<String> = found.into_iter().map(placed).collect();
+    all.into_iter().collect()
+}
+
+/// Values of an attribute, in either kind of quotes.
+fn attributes<'a>(text: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
+    text.match_indices(name).filter_map(move |(at, _)| {
+        let begins = text[..at].ends_with(|c: char| c.is_whitespace());
+        let rest = text[at + name.len()..].trim_start().strip_prefix('=')?.trim_start();
+        let quote = rest.chars().next().filter(|q| begins && ['"', '\''].contains(q))?;
+        rest[1..].split(quote).next()
+    })
 }
 
 /// 128 bits over all resources and the way they are shown, as a GUID: FNV-1a twice, with two starts.
@@ -297,10 +375,26 @@ fn about(request: &Request, scenario: &Scenario, settings: &ExportSettings) -> A
         token: settings.token.clone(),
         tool: format!("Terraglue {}", env!("CARGO_PKG_VERSION")),
         license: "The library: MIT OR Apache-2.0. The model: that of its files.".into(),
+        origin: request.origin.clone(),
         stop_s: scenario.time.duration_s,
         step_s: scenario.time.step_s,
         fixed_step_s: None,
     }
+}
+
+/// The oldest glibc that the libraries of an FMU run with.
+fn glibc(entries: &[(String, Content)]) -> Result<Option<String>> {
+    let mut all = Vec::new();
+    for (name, content) in entries.iter().filter(|(name, _)| name.ends_with(".so")) {
+        let read = |path: &PathBuf| std::fs::read(path).map_err(|e| plain(format!("{name}: {e}")));
+        all.extend(match content {
+            Content::File(path) => needed_glibc(&read(path)?),
+            Content::Bytes(bytes) => needed_glibc(bytes),
+            Content::Text(_) => None,
+        });
+    }
+    let minor = |version: &String| version.rsplit('.').next().and_then(|m| m.parse::<u32>().ok());
+    Ok(all.into_iter().max_by_key(minor))
 }
 
 /// Everything in the archive, in its order.
@@ -313,17 +407,20 @@ fn entries(
 ) -> Result<Vec<(String, Content)>> {
     let library = search.folders().iter().map(|f| f.join(LIBRARY)).find(|p| p.is_file());
     let library = library.ok_or_else(|| {
-        let help =
-            "build it with `cargo build --package terraglue-fmu-library`, or give its folder by --module-path";
+        // beside a program of release, a library of release
+        let profile = if cfg!(debug_assertions) { "" } else { " --release" };
+        let help = format!(
+            "build it with `cargo build{profile} --package terraglue-fmu-library`, or give its folder by --module-path"
+        );
         InputError::plain(
             format!("the library of exported FMUs, {LIBRARY}, was not found"),
-            Some(help.into()),
+            Some(help),
         )
     })?;
     let two = request.version == Version::V2;
     let description =
         describe(opened.subsystem.as_ref(), &opened.layout, about).map_err(|e| plain(e.to_string()))?;
-    let platform = if two { "linux64" } else { "x86_64-linux" };
+    let platform = terraglue_fmi::platform(request.version);
     let mut all = vec![
         ("modelDescription.xml".to_owned(), Content::Text(description)),
         (format!("binaries/{platform}/{}.so", about.identifier), Content::File(library)),
@@ -345,4 +442,36 @@ fn entries(
         all.push((format!("resources/{name}"), Content::Bytes(bytes)));
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_a_robot_are_found_in_either_quotes_and_below_its_folders() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let write = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
+            std::fs::write(path, text)
+        };
+        for mesh in ["meshes/a.stl", "meshes/parts/b.obj", "c.stl", "pictures/d.png"] {
+            write(mesh, "")?;
+        }
+        write(
+            "robot.xml",
+            "<mujoco><compiler meshdir='meshes' texturedir = \"pictures/\"/><include file=\"more/legs.xml\"/>\
+             <asset><mesh file='a.stl'/><texture file='d.png'/></asset></mujoco>",
+        )?;
+        write("more/legs.xml", "<mujoco><asset><mesh file=\"parts/b.obj\"/></asset></mujoco>")?;
+        let all = named_files(&folder.path().join("robot.xml"));
+        assert_eq!(all, ["meshes/a.stl", "meshes/parts/b.obj", "more/legs.xml", "pictures/d.png"]);
+        write(
+            "robot.urdf",
+            "<robot><mesh filename='c.stl'/><mesh filename = \"package://meshes/a.stl\"/></robot>",
+        )?;
+        assert_eq!(named_files(&folder.path().join("robot.urdf")), ["c.stl", "meshes/a.stl"]);
+        Ok(())
+    }
 }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terraglue_engine::testbed::{Options, Testbed};
 use terraglue_fmi::Version;
-use terraglue_fmi::export::{Layout, Opened, Opening};
+use terraglue_fmi::export::{Layout, Opened, Opening, Origin};
 use terraglue_scenario::Scenario;
 use whole::Whole;
 
@@ -41,6 +41,10 @@ pub struct Request {
     pub version: Version,
     /// Arrays element by element also in FMI 3.0.
     pub scalars: bool,
+    /// Who made the model, which version of it, and when, as the description says it.
+    pub origin: Origin,
+    /// Whether results of its first steps go into it.
+    pub reference: bool,
     /// Where the FMU goes.
     pub out: PathBuf,
 }

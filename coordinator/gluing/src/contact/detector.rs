@@ -241,7 +241,7 @@ impl Bodies {
         Ok(farthest)
     }
 
-    /// How a piece is buried by more than its own height: what then lies on top of it no soil knows.
+    /// Message on a piece that is buried by more than its own height: no soil models the material on top of it.
     fn buried(&self, piece: Range<usize>, reader: &Reader) -> Option<String> {
         let whole = Touching::of(&self.shapes, &self.numbers[piece.clone()])?.bounds;
         let [x, y, _] = whole.centre();

@@ -7,7 +7,7 @@ use terraglue_subsystem::Node;
 /// Smallest upward part of a normal that is reckoned with; steeper ground is no height field any more.
 const STEEPEST: f64 = 0.2;
 
-/// Where a shape stands on the ground.
+/// Contact patch of a shape on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
     /// The shape's lowest point along −n, world, m.

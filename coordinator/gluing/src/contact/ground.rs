@@ -7,7 +7,7 @@ use terraglue_diagnostics::error::{Error, Result};
 use terraglue_ground::{HeightField, Lattice, Surface, TILE_EDGE};
 use terraglue_subsystem::{FieldInfo, FieldTile, Subsystem, Terrain, TileValues};
 
-/// What stays the same of a ground over a run, and the bounds of its tiles.
+/// Constants of a ground over a run, and the bounds of its tiles.
 pub struct Ground {
     /// Index of the subsystem that owns it.
     pub subsystem: u32,
@@ -76,7 +76,7 @@ impl Ground {
     }
 }
 
-/// What cannot be read.
+/// Errors of reading a ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trouble {
     /// The soil refused tile (a, b).
@@ -310,7 +310,7 @@ impl<'a> Undisturbed<'_, 'a> {
         reader.recall(&reader.sunk, a, b, || reader.instance.field_tile(*field, a, b).ok())
     }
 
-    /// How far node (i, j) has sunk, m.
+    /// Sinkage of node (i, j), m.
     fn sunk(&self, i: i32, j: i32) -> f64 {
         let (reader, edge) = (self.0, self.0.edge);
         let (i, j) = reader.lattice.clamp(i, j);

@@ -9,7 +9,7 @@ pub struct PortSet {
     pub ports: Vec<Port>,
     /// Ground nodes of all ports, one port after the other.
     pub nodes: Vec<Node>,
-    /// Whose ports they are, in the same order.
+    /// Owners of the ports, in the same order.
     pub owners: Vec<PortOwner>,
     /// Grows when a port appears, goes or changes its mask.
     pub epoch: u32,
@@ -17,7 +17,7 @@ pub struct PortSet {
     pub n: u32,
 }
 
-/// What meets at a port.
+/// The two sides of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortOwner {
     /// Index of the subsystem that has the body.

@@ -41,7 +41,7 @@ impl Shape {
         }
     }
 
-    /// How far any point of the shape can get within the step, and the margin: |v|h + ½|g|h² + margin.
+    /// Largest distance of any point of the shape within the step, and the margin: |v|h + ½|g|h² + margin.
     pub fn reach(&self, now: &Now, state: &BodyState) -> f64 {
         let bounds = &self.bounds;
         let c = bounds.centre();

@@ -46,7 +46,7 @@ pub(super) enum Form {
     Xt,
 }
 
-/// What both forms iterate with.
+/// Limits of both forms of the iteration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     /// τ of the stopping rule.
@@ -64,7 +64,7 @@ impl Form {
         }
     }
 
-    /// What a soil must offer.
+    /// Capabilities that a soil needs.
     pub fn need(form: Option<Self>) -> Capabilities {
         match form {
             Some(Self::Tt) => Capabilities::FORCE,

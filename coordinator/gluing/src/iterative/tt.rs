@@ -20,7 +20,7 @@ use terraglue_scenario::JacobianChoice;
 /// Trials of one line search.
 const MAX_TRIALS: u32 = 12;
 
-/// What rounding leaves of a gap between places of some metres, m.
+/// Rounding of a gap between places of some metres, m.
 const ROUNDING_M: f64 = 1e-13;
 
 /// Iterations against the linearised bodies after which steps must pass the filter.
@@ -45,7 +45,7 @@ pub struct TtForm {
     predicted: Vec<f64>,
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// What earlier iterates left open in the laws and at the normals, N.
+    /// Residuals of earlier iterates in the laws and at the normals, N.
     filter: Vec<[f64; 2]>,
     solver: BoundedSolver,
     jacobian: Refresh,

@@ -9,13 +9,13 @@ const NODES: usize = 64;
 const SINGLES: usize = 1 << 13;
 const ROWS: usize = 1 << 7;
 
-/// What a law is asked: one or two numbers of each node, or one of all and one of each.
+/// Arguments of a law: one or two numbers of each node, or one of all and one of each.
 pub struct Question<'a> {
     /// Which function.
     pub function: Call,
     /// Length of the step, s.
     pub h: f64,
-    /// What is given, the last array with an entry per node.
+    /// Arguments, the last array with an entry per node.
     pub given: [&'a [f64]; 2],
 }
 

@@ -10,7 +10,7 @@ use terraglue_subsystem::{
 /// The calls, numbered from 1 in this order.
 macro_rules! calls {
     ($first:ident, $($other:ident),+ $(,)?) => {
-        /// What can be asked of a worker.
+        /// Calls of a worker.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum Call {

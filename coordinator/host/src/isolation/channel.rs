@@ -15,7 +15,7 @@ pub const AREA: usize = 64 << 20;
 const HEAD: usize = 4096;
 const LENGTH: usize = HEAD + 2 * AREA;
 
-/// What stands at the start of a segment.
+/// Header of a segment.
 #[repr(C)]
 struct Head {
     call: AtomicU32,
@@ -32,10 +32,10 @@ pub struct Segment {
     luck: Cell<i32>,
 }
 
-/// How long either side looks for the other before it sleeps. Longer than it takes to wake the other, so that two sides
-/// that both sleep come to look at each other again.
+/// Time for which either side looks for the other before it sleeps. Longer than it takes to wake the other, so that two
+/// sides that both sleep come to look at each other again.
 const LOOK: Duration = Duration::from_micros(150);
-/// How many waits go without a look after looks in vain: a slow worker or a busy machine is not worth them.
+/// Number of waits without a look after looks in vain: a slow worker or a busy machine is not worth them.
 const PAUSE: i32 = 256;
 
 // SAFETY: the memory is reached through `&self` by atomics only, and else through `&mut self`.

@@ -60,7 +60,7 @@ impl ForkServer {
         Ok(fork_server)
     }
 
-    /// What the processes that may use it get into their environment.
+    /// Environment variable of the processes that may use it.
     pub fn variable(&self) -> (String, String) {
         (FORK_SERVER.into(), self.folder.path().to_string_lossy().into_owned())
     }
@@ -105,7 +105,7 @@ impl WorkerProcess {
         }
     }
 
-    /// How it has ended, if it has.
+    /// Its exit status, if it has ended.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         match self {
             Self::Own(child) => child.try_wait().ok().flatten(),
@@ -145,7 +145,7 @@ impl Forked {
     fn ended(&mut self) -> Option<ExitStatus> {
         match number(&mut self.fork_server) {
             Some(status) => Some(ExitStatus::from_raw(status)),
-            // Where the fork server is gone nobody knows how the worker ended.
+            // If the fork server is gone the exit status of the worker is unknown.
             None if Path::new(&format!("/proc/{}", self.id)).exists() => None,
             None => Some(ExitStatus::from_raw(libc::SIGKILL)),
         }

@@ -7,11 +7,11 @@ use terraglue_subsystem::{Error, Message, Result, Subsystem};
 #[derive(Debug, Default)]
 pub struct Messages {
     kept: Vec<Option<(f64, Vec<u8>)>>,
-    /// What was wrong with each instead of a message.
+    /// Error of each instead of a message.
     wrong: Vec<Option<String>>,
 }
 
-/// How a message begins on its way.
+/// First byte of a message on its way.
 const NONE: u8 = 0;
 const THERE: u8 = 1;
 const FAILED: u8 = 2;

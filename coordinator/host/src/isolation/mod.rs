@@ -55,7 +55,7 @@ impl Default for Isolation {
     }
 }
 
-/// What a worker is to make.
+/// Object that a worker makes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum What {
     /// A functional mock-up unit with the keys of its table.
@@ -153,11 +153,11 @@ fn linked(
     Ok((link, start))
 }
 
-/// How often a waiting host looks whether the worker still lives.
+/// Interval at which a waiting host looks whether the worker still lives.
 const LOOK: Duration = Duration::from_millis(20);
 /// The longest time between two looks that counts.
 const BLINK: Duration = Duration::from_millis(100);
-/// How long a worker may take to say good-bye.
+/// Largest time of a worker for its end.
 const PARTING: Duration = Duration::from_secs(2);
 
 /// A worker and the way to it.
@@ -313,7 +313,7 @@ impl Drop for Link {
     }
 }
 
-/// How a process ended, in words.
+/// Description of the end of a process.
 pub fn last_words(status: ExitStatus) -> String {
     use std::os::unix::process::ExitStatusExt;
     let Some(signal) = status.signal() else {

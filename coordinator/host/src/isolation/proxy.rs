@@ -24,7 +24,7 @@ pub struct Isolated {
     told: Cell<bool>,
 }
 
-/// What never changes over its life.
+/// Constants of its life.
 pub struct ModuleInfo {
     pub capabilities: Capabilities,
     pub variables: Vec<Variable>,

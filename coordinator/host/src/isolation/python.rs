@@ -7,8 +7,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What stands beside a worker, by file name: what modules derive from, what is read and written, the
-/// loop, and the interpreter that is copied.
+/// Files beside a worker, by name: the base class of modules, reading and writing, the loop, and the interpreter that
+/// is copied.
 pub(super) const FILES: [(&str, &str); 4] = [
     ("terraglue.py", SDK),
     ("terraglue_wire.py", include_str!("../../../../interfaces/plugin/python/terraglue_wire.py")),
@@ -19,7 +19,7 @@ pub(super) const FILES: [(&str, &str); 4] = [
     ),
 ];
 
-/// What a module in Python derives from.
+/// Base class of modules in Python.
 pub const SDK: &str = include_str!("../../../../interfaces/plugin/python/terraglue.py");
 
 /// Ahead of everything else on the path stand the files of this program; the working folder does not stand there.

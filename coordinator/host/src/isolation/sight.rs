@@ -11,7 +11,7 @@ use terraglue_subsystem::{
     Subsystem, World,
 };
 
-/// What an instance asks while it observes.
+/// Questions of an instance while it observes.
 pub enum Question {
     Names,
     Scene(u32),
@@ -41,7 +41,7 @@ impl Question {
         }
     }
 
-    /// What stands in the answer to [`Call::Observe`]: a question, or the end of them.
+    /// Content of the answer to [`Call::Observe`]: a question, or the end of them.
     pub fn take(r: &mut Reader) -> Option<Option<Self>> {
         Some(Some(match r.take::<u8>()? {
             0 => return Some(None),
@@ -109,7 +109,7 @@ fn take_option<T: Wire>(r: &mut Reader) -> Option<Option<T>> {
     })
 }
 
-/// What a worker has copied of names and scenes; asked for once for each revision of the world.
+/// Copies of names and scenes in a worker; requested once for each revision of the world.
 #[derive(Default)]
 pub struct Known {
     revision: Option<u64>,
@@ -138,7 +138,7 @@ struct AskingWorld<'a> {
 /// Lets the instance look, and asks the host what it wants to know.
 ///
 /// # Errors
-/// What the instance answers. [`Error::Fatal`]: the call is garbled.
+/// Errors of the instance. [`Error::Fatal`]: the call is garbled.
 pub fn observe(
     subsystem: &mut dyn Subsystem,
     r: &mut Reader,

@@ -65,7 +65,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// What can cross.
+/// Values that can cross.
 pub trait Wire: Sized {
     fn put(&self, w: &mut Writer);
     fn take(r: &mut Reader) -> Option<Self>;
@@ -94,7 +94,7 @@ impl Wire for bool {
     }
 }
 
-/// What can be written, slices and texts among it.
+/// Values that can be written, slices and texts among them.
 pub trait Put {
     fn put_into(&self, w: &mut Writer);
 }

@@ -130,7 +130,7 @@ impl Worker {
         })
     }
 
-    /// What follows an outcome that is good.
+    /// Appends the data that follow a good outcome.
     fn append(&mut self, call: Option<Call>, w: &mut Writer, body: &[u8]) {
         let Some(subsystem) = &self.subsystem else { return };
         match call {
@@ -191,7 +191,7 @@ impl Worker {
         Ok(())
     }
 
-    /// What a process beside the instance is offered.
+    /// Services for a process beside the instance.
     fn services(&self, folder: &str) -> HostServices {
         let log = self.log.clone();
         HostServices {
@@ -429,7 +429,7 @@ impl Terrain for Grid {
     }
 }
 
-/// What the host offers, on this side of the border.
+/// Services of the host, on this side of the border.
 struct WorkerHost {
     log: Arc<Log>,
     workers: Workers,

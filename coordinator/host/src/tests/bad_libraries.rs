@@ -127,7 +127,7 @@ fn tables_and_schemas_that_cannot_be_used() {
     assert!(text.contains("out of sand"), "{text}");
 }
 
-/// What the host says of a step with the given body of `advance`.
+/// Message of the host for a step with the given body of `advance`.
 fn step_message(advance: &str) -> String {
     let folder = folder();
     let module = LoadedModule::load(&odd(folder.path(), &[&format!("ADVANCE={advance}")])).expect("loads");

@@ -6,7 +6,6 @@
 use super::McapWriter;
 use super::sink::Encoder;
 use crate::keep::Keep;
-use crate::kept_file::{KeptFile, shorter};
 use crate::layout::{RECORDING, at, other_at};
 use crate::messages::WindowRecord;
 use crate::overlays::Overlays;
@@ -20,6 +19,7 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
 use terraglue_diagnostics::error::Result;
 use terraglue_engine::observer::View;
+use terraglue_host::kept_file::{KeptFile, shorter};
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::bytes::Block;
 use terraglue_subsystem::persist;
@@ -39,7 +39,11 @@ impl Pending {
         Self { channel, sequence, time_ns, data: Block(data.to_vec()) }
     }
 
-    fn header(&self) -> MessageHeader {
+    pub fn bytes(&self) -> &[u8] {
+        &self.data.0
+    }
+
+    pub fn header(&self) -> MessageHeader {
         let Self { channel: channel_id, sequence, time_ns: log_time, .. } = *self;
         MessageHeader { channel_id, sequence, log_time, publish_time: log_time }
     }

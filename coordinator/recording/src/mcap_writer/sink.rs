@@ -5,7 +5,6 @@
 //! its messages; a full queue makes it wait, and so does the end of a chunk while the chunk before is not on disk. An error of the
 //! thread is returned by a later call.
 
-use crate::kept_file::KeptFile;
 use crate::topics::Topic;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
@@ -15,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use terraglue_host::kept_file::KeptFile;
 
 /// The encoder of the file.
 pub(super) type Encoder = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;

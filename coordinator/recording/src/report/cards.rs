@@ -38,7 +38,7 @@ fn list(class: &str, cards: impl IntoIterator<Item = Card>) -> String {
     for c in cards {
         let _ = write!(
             out,
-            r#"<div class="card{}"><dt>{}</dt><dd><b{}>{}</b>&#8239;<span class="unit">{}</span></dd><p>{}</p></div>"#,
+            r#"<div class="card{}"><dt>{}</dt><dd><b{}>{}</b>&#8239;<span class="unit">{}</span></dd><dd class="more">{}</dd></div>"#,
             if c.off { " off" } else { "" },
             c.label,
             // words are longer than numbers

@@ -64,7 +64,7 @@ pub fn render(e: &Energies) -> String {
         };
         let _ = write!(
             out,
-            r#"<div class="card{off}"><dt>{label}</dt><dd><b>{}</b></dd><p>{}</p></div>"#,
+            r#"<div class="card{off}"><dt>{label}</dt><dd><b>{}</b></dd><dd class="more">{}</dd></div>"#,
             escape(&text(value(e))),
             escape(&more)
         );

@@ -3,7 +3,6 @@
 
 use crate::prints::Print;
 use crate::reader::{GroundRecord, Recording};
-use crate::report::colour_map::Palette;
 use crate::report::figure::packed;
 use crate::report::footprints::Leg;
 use crate::report::outlines::{self, Outline};
@@ -11,6 +10,7 @@ use crate::report::{node_values, picture};
 use base64::Engine;
 use serde_json::{Value, json};
 use terraglue_diagnostics::error::{Error, Result};
+use terraglue_page::colour_map::Palette;
 
 /// Place of the map in the page.
 pub(crate) const FRAME: &str = r#"<div class="map" id="map">

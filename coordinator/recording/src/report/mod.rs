@@ -10,9 +10,10 @@ mod figures;
 mod ground_map;
 mod node_values;
 mod outlines;
+mod replay;
 mod setup;
+mod tree_match;
 
-pub mod colour_map;
 pub mod energy_card;
 pub mod figure;
 pub mod footprints;
@@ -24,13 +25,13 @@ use crate::layout::{REPORT, at};
 use crate::reader::Recording;
 use crate::summary::Summary;
 use std::path::{Path, PathBuf};
-use terraglue_diagnostics::error::Result;
+use terraglue_diagnostics::error::{Error, Result};
 
 /// Makes the report of a results folder from its recording and, where it is there, `summary.json`. The
 /// recording may be cut off ([`crate::mend`] gives it its footer). Returns the path of the page.
 ///
 /// # Errors
-/// [`Error::File`](terraglue_diagnostics::Error::File): the recording cannot be read, or the report not be written.
+/// [`Error::File`]: the recording cannot be read, or the report not be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let recording = Recording::open(folder)?;
     let summary = Summary::read(folder).ok();
@@ -43,7 +44,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 /// The page as text, of the recording alone.
 ///
 /// # Errors
-/// [`Error::File`](terraglue_diagnostics::Error::File): a part of the recording cannot be read.
+/// [`Error::File`]: a part of the recording cannot be read.
 pub fn render(recording: &Recording, summary: Option<&Summary>) -> Result<String> {
     page(recording, summary, None)
 }
@@ -52,6 +53,10 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
     let legs = footprints::legs(recording);
     let mut page = page::Page::new(&title(recording));
     page.header(&setup::headline(recording, summary));
+    if let Some(data) = replay::data(recording).map_err(|e| unmade(recording, &e))? {
+        page.section("The run", "run", replay::FRAME);
+        page.data("replay", data);
+    }
     page.section("At a glance", "figures", &cards::render(recording, summary));
     if let Some(summary) = summary {
         page.section("Where the energy went", "energies", &energy_card::render(&summary.energy.energies));
@@ -61,7 +66,10 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
         page.section("The ground from above", "ground", ground_map::FRAME);
         page.data("map", map);
     }
-    for figure in figures::all(recording, &legs) {
+    if let Some(html) = tree_match::section(recording) {
+        page.section("Among the trees", "tree-map", &html);
+    }
+    for figure in tree_match::figure(recording).into_iter().chain(figures::all(recording, &legs)) {
         page.figure(figure);
     }
     let events: Vec<_> =
@@ -71,6 +79,10 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
         page.section("How values went round", "exchange", html);
     }
     Ok(page.finish())
+}
+
+fn unmade(recording: &Recording, why: &std::io::Error) -> Error {
+    Error::Simulation { time_s: recording.end_s(), message: format!("replay: {why}") }
 }
 
 fn title(recording: &Recording) -> String {

@@ -16,10 +16,7 @@ const MOST_NODES: usize = 2_000_000;
 /// As data of the page.
 pub(crate) fn of(ground: &GroundRecord) -> std::io::Result<Value> {
     let [nx, ny] = ground.size;
-    let mut stride = 1;
-    while nx.div_ceil(stride) * ny.div_ceil(stride) > MOST_NODES {
-        stride += 1;
-    }
+    let stride = stride(ground.size);
     let pick = |values: &[f32]| -> Vec<f64> {
         let rows = values.chunks_exact(nx).step_by(stride);
         rows.flat_map(|row| row.iter().step_by(stride).map(|v| f64::from(*v))).collect()
@@ -31,8 +28,17 @@ pub(crate) fn of(ground: &GroundRecord) -> std::io::Result<Value> {
     }))
 }
 
+/// Every how many nodes one is kept.
+pub(crate) fn stride([nx, ny]: [usize; 2]) -> usize {
+    let mut stride = 1;
+    while nx.div_ceil(stride) * ny.div_ceil(stride) > MOST_NODES {
+        stride += 1;
+    }
+    stride
+}
+
 /// Lowest value, step, and the numbers.
-fn pack(values: &[f64]) -> std::io::Result<Value> {
+pub(crate) fn pack(values: &[f64]) -> std::io::Result<Value> {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let low = if low.is_finite() { low } else { 0.0 };

@@ -4,14 +4,7 @@ use crate::report::figure::{Figure, Times};
 use crate::report::html::{escape, number};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
-
-const STYLE: &str = include_str!("../assets/page.css");
-const THEME: &str = include_str!("../assets/theme.js");
-const AXES: &str = include_str!("../assets/axes.js");
-const PLOT: &str = include_str!("../assets/plot.js");
-const XY: &str = include_str!("../assets/xy.js");
-const GROUND: &str = include_str!("../assets/ground.js");
-const MAP: &str = include_str!("../assets/map.js");
+use terraglue_page::{REPORT_MODULES, import_map, text};
 
 /// A page under construction.
 pub struct Page {
@@ -116,13 +109,17 @@ impl Page {
         format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{title} · Terraglue</title>\n<style>\n{STYLE}</style>\n<script>\n{THEME}</script>\n</head>\n<body{class}>\n\
+             <title>{title} · Terraglue</title>\n<style>\n{style}</style>\n<script>\n{theme}</script>\n\
+             <script type=\"importmap\">{modules}</script>\n</head>\n<body{class}>\n\
              <header class=\"top\"><div class=\"bar\"><span class=\"brand\">Terraglue</span><nav>{contents}</nav>\
              <button type=\"button\" id=\"theme\" aria-label=\"switch between light and dark\">◐</button></div></header>\n\
              <main>\n<h1>{title}</h1>\n{header}\n{body}</main>\n\
              <footer>Made by Terraglue from the recording beside this file. All quantities in SI units; z is up.</footer>\n\
              <script type=\"application/json\" id=\"data\">{data}</script>\n\
-             <script>\n{AXES}{PLOT}{XY}{GROUND}{MAP}</script>\n</body>\n</html>\n",
+             <script type=\"module\">import \"terraglue/report.js\";</script>\n</body>\n</html>\n",
+            style = [text("page.css"), text("view.css")].concat(),
+            theme = text("theme.js"),
+            modules = import_map(REPORT_MODULES),
             class = self.class,
             header = self.header,
             body = self.body,

@@ -1,7 +1,7 @@
 //! The ground as a PNG: colour by sinkage, hill shading by height.
 
 use crate::reader::GroundRecord;
-use crate::report::colour_map::Palette;
+use terraglue_page::colour_map::Palette;
 
 /// Longest side of the picture, pixels.
 const LONGEST_SIDE: usize = 1600;

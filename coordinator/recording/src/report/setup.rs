@@ -78,7 +78,7 @@ pub(crate) fn render(recording: &Recording) -> String {
     if !h.get("scenario_text").is_empty() {
         let _ = write!(
             out,
-            r#"<details open><summary>Scenario <code>{}.toml</code></summary><pre>{}</pre></details>"#,
+            r#"<details open><summary>Scenario <code>{}.toml</code></summary><pre tabindex="0">{}</pre></details>"#,
             escape(h.get("scenario")),
             escape(h.get("scenario_text").trim_end())
         );

@@ -300,6 +300,7 @@ pub fn scenario(strategy: &str) -> Scenario {
             commanded_speed: Some("gait.speed".into()),
             joint: Some("robot.LF_j2".into()),
         },
+        page: Default::default(),
         subsystems: vec![part("gait", "gait"), part("robot", "rigid-body"), part("soil", "soil-bekker")],
         glue: Vec::new(),
         connections: Vec::new(),

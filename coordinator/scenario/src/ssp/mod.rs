@@ -103,9 +103,9 @@ fn times(package: &Package, network: &Network, notes: &mut Vec<String>) -> Resul
     if !(duration > 0.0 && duration.is_finite() && wanted.is_finite()) {
         return Err(network::refused(package, format!("stopTime = {duration} s cannot be run")));
     }
-    let steps = duration / wanted.min(1.0);
+    let steps = duration / wanted;
     let whole = (steps - steps.round()).abs() < 1e-9 * steps;
-    let step = if whole && wanted <= 1.0 { wanted } else { duration / steps.ceil().max(1.0) };
+    let step = if whole { wanted } else { duration / steps.ceil().max(1.0) };
     Ok((duration, step))
 }
 

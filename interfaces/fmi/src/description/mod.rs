@@ -1,5 +1,6 @@
 //! What an FMU says of itself: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
+mod defects;
 pub(crate) mod element;
 mod model;
 mod resize;
@@ -8,6 +9,7 @@ mod terminals;
 pub(crate) mod types;
 mod variables;
 
+pub use defects::{Defect, DefectKind};
 pub use model::*;
 
 use crate::error::{Error, Result};
@@ -69,6 +71,8 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
         scheduled_execution: root.child("ScheduledExecution").is_some(),
         experiment: experiment(root)?,
         units: types::units(root)?,
+        plain_units: types::plain_units(root)?,
+        log_categories: log_categories(root)?,
         types: types::types(root, version)?,
         ..ModelDescription::default()
     };
@@ -130,6 +134,14 @@ fn capabilities(element: &Element, version: Version) -> Result<Capabilities> {
         return_early: flag("canReturnEarlyAfterIntermediateUpdate")?,
         interpolates_inputs: flag("canInterpolateInputs")?,
     })
+}
+
+fn log_categories(root: &Element) -> Result<Vec<String>> {
+    let Some(list) = root.child("LogCategories") else { return Ok(Vec::new()) };
+    list.children()
+        .filter(|e| e.name() == "Category")
+        .map(|e| e.required("name").map(str::to_owned))
+        .collect()
 }
 
 fn experiment(root: &Element) -> Result<Experiment> {

@@ -40,6 +40,10 @@ pub struct ModelDescription {
     pub experiment: Experiment,
     /// Its units by name.
     pub units: Vec<(String, Unit)>,
+    /// Names of its units whose base unit is not given.
+    pub plain_units: Vec<String>,
+    /// Categories of its log.
+    pub log_categories: Vec<String>,
     /// Its declared types.
     pub types: Vec<DeclaredType>,
     /// Variables in the order of the file, aliases of FMI 3 among them.
@@ -301,11 +305,6 @@ impl Variable {
     /// Whether a dimension is zero.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
-    }
-
-    /// Whether a value may be set while the model is initialised.
-    pub fn has_start(&self) -> bool {
-        self.start != Start::None || matches!(self.causality, Causality::Input | Causality::Parameter)
     }
 }
 

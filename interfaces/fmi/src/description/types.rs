@@ -12,6 +12,13 @@ pub fn units(root: &Element) -> Result<Vec<(String, Unit)>> {
     root.child("UnitDefinitions").map_or(Ok(Vec::new()), |list| listed(&list))
 }
 
+/// Names of units whose base unit is not given.
+pub fn plain_units(root: &Element) -> Result<Vec<String>> {
+    let Some(list) = root.child("UnitDefinitions") else { return Ok(Vec::new()) };
+    let plain = list.children().filter(|e| e.name() == "Unit" && e.child("BaseUnit").is_none());
+    plain.map(|e| e.required("name").map(str::to_owned)).collect()
+}
+
 /// The same below the element that holds the list.
 pub fn listed(list: &Element) -> Result<Vec<(String, Unit)>> {
     let mut all = Vec::new();

@@ -7,6 +7,17 @@ use std::fmt::Display;
 use terraglue_subsystem::unit::Unit;
 use terraglue_subsystem::{Capabilities, Causality, Effect, Result, Subsystem, ValueType, Variable};
 
+/// Where a model comes from; what is not given is left out of the description.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Author.
+    pub author: Option<String>,
+    /// Version of the model.
+    pub version: Option<String>,
+    /// Date and time in ISO 8601, UTC.
+    pub date: Option<String>,
+}
+
 /// What the description says beside the variables.
 #[derive(Clone, Debug)]
 pub struct About {
@@ -22,6 +33,8 @@ pub struct About {
     pub tool: String,
     /// Licence of the FMU.
     pub license: String,
+    /// Who made it, and when.
+    pub origin: Origin,
     /// Usual end of a run, s.
     pub stop_s: f64,
     /// Usual communication step, s.
@@ -65,18 +78,20 @@ impl Writer<'_> {
         let a = self.about;
         let (version, token) = if self.two() { ("2.0", "guid") } else { ("3.0", "instantiationToken") };
         let convention = if self.structured() { "structured" } else { "flat" };
-        xml.open(
-            "fmiModelDescription",
-            &[
-                ("fmiVersion", &version),
-                ("modelName", &a.name),
-                (token, &a.token),
-                ("description", &a.description),
-                ("license", &a.license),
-                ("generationTool", &a.tool),
-                ("variableNamingConvention", &convention),
-            ],
-        );
+        let mut attributes: Vec<(&str, &dyn Display)> = vec![
+            ("fmiVersion", &version),
+            ("modelName", &a.name),
+            (token, &a.token),
+            ("description", &a.description),
+        ];
+        let origin = [("author", &a.origin.author), ("version", &a.origin.version)];
+        let given =
+            origin.into_iter().filter_map(|(name, text)| Some((name, text.as_ref()? as &dyn Display)));
+        attributes.extend(given);
+        attributes.extend([("license", &a.license as &dyn Display), ("generationTool", &a.tool)]);
+        attributes.extend(a.origin.date.iter().map(|date| ("generationDateAndTime", date as &dyn Display)));
+        attributes.push(("variableNamingConvention", &convention));
+        xml.open("fmiModelDescription", &attributes);
         self.co_simulation(&mut xml);
         self.units(&mut xml);
         self.types(&mut xml);

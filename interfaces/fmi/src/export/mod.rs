@@ -14,13 +14,14 @@ mod terminals;
 mod values;
 mod xml;
 
-pub use describe::{About, describe, identifier};
+pub use describe::{About, Origin, describe, identifier};
 pub use exported_instance::{ExportedInstance, Mailbox, Open, Opened, Opening, Phase, Reached};
 pub use layout::{Entry, Layout};
-pub use pack::{Content, pack};
+pub use pack::{Compression, Content, pack};
 pub use states::Handle;
 pub use terminals::{JointTerminal, terminals};
 pub use values::FmiType;
+pub(crate) use xml::Xml;
 
 /// What a call of an FMU did not do, with the status that the standards give it.
 #[derive(Clone, Debug, PartialEq)]

@@ -16,11 +16,20 @@ pub enum Content {
     File(PathBuf),
 }
 
+/// How the entries of an archive are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compression {
+    /// As they are: for an archive that is read once.
+    None,
+    /// Smaller.
+    Deflate,
+}
+
 /// Writes an archive with these entries, in their order. The same content gives the same bytes: no time is written.
 ///
 /// # Errors
 /// What cannot be read or written, with its path.
-pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
+pub fn pack(path: &Path, entries: &[(String, Content)], compression: Compression) -> Result<(), String> {
     let failed = |what: &Path, e: &dyn std::fmt::Display| format!("{}: {e}", what.display());
     // the archive is renamed into its place: what is no file there (`/dev/null`, a pipe) would be gone
     if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
@@ -44,11 +53,17 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
     let part = part.map_err(|e| failed(path, &e))?;
     // whole in memory: a writer of archives that meets a full disk complains a second time when it is dropped
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let method = match compression {
+        Compression::None => zip::CompressionMethod::Stored,
+        Compression::Deflate => zip::CompressionMethod::Deflated,
+    };
     for (name, content) in entries {
         let library = name.starts_with("binaries/") || name.ends_with(".so");
-        let options = SimpleFileOptions::default()
-            .compression_method(zip::CompressionMethod::Deflated)
-            .unix_permissions(if library { 0o755 } else { 0o644 });
+        let options = SimpleFileOptions::default().compression_method(method).unix_permissions(if library {
+            0o755
+        } else {
+            0o644
+        });
         archive.start_file(name.as_str(), options).map_err(|e| failed(path, &e))?;
         match content {
             Content::Text(text) => archive.write_all(text.as_bytes()).map_err(|e| failed(path, &e))?,
@@ -94,20 +109,20 @@ mod tests {
         let entries = [("a.txt".to_owned(), Content::Text("a".into()))];
         let socket = folder.path().join("socket");
         let _open = std::os::unix::net::UnixListener::bind(&socket).expect("a socket");
-        let message = pack(&socket, &entries).expect_err("no file");
+        let message = pack(&socket, &entries, Compression::Deflate).expect_err("no file");
         assert!(message.contains("is no file"), "{message}");
         assert!(std::fs::metadata(&socket).expect("stands").file_type().is_socket());
         let notes = folder.path().join("notes.txt");
         std::fs::write(&notes, "a week of work").expect("written");
-        assert!(pack(&notes, &entries).expect_err("kept").contains("would be lost"));
+        assert!(pack(&notes, &entries, Compression::Deflate).expect_err("kept").contains("would be lost"));
         assert!(
-            pack(&folder.path().join("none/a.fmu"), &entries)
+            pack(&folder.path().join("none/a.fmu"), &entries, Compression::Deflate)
                 .expect_err("no folder")
                 .contains("there is no folder")
         );
         let file = folder.path().join("unit.fmu");
         for _ in 0..2 {
-            pack(&file, &entries).expect("new, and in the place of a file");
+            pack(&file, &entries, Compression::Deflate).expect("new, and in the place of a file");
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::{Display, Write};
 
 /// Text of an XML document that grows.
 #[derive(Debug, Default)]
-pub(super) struct Xml {
+pub struct Xml {
     text: String,
     depth: usize,
 }

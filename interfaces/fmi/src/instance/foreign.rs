@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::floating_point::Keep;
 use std::cell::Cell;
 use std::ffi::c_int;
+use std::fmt;
 use std::sync::Arc;
 
 /// Whether an instance may be called.
@@ -50,6 +51,20 @@ impl From<c_int> for CallStatus {
             4 => Self::Fatal,
             5 => Self::Pending,
             other => Self::Unknown(other),
+        }
+    }
+}
+
+impl fmt::Display for CallStatus {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Ok => f.write_str("ok"),
+            Self::Warning => f.write_str("warning"),
+            Self::Discard => f.write_str("discard"),
+            Self::Error => f.write_str("error"),
+            Self::Fatal => f.write_str("fatal"),
+            Self::Pending => f.write_str("pending"),
+            Self::Unknown(status) => write!(f, "{status}, which is no status"),
         }
     }
 }
@@ -120,9 +135,20 @@ impl ForeignInstance {
             return Err(self.not_called(function));
         };
         self.log.begin();
-        match run(f, self.component) {
+        self.trace(format_args!("{function}"));
+        let status = run(f, self.component);
+        self.trace(format_args!("  {}", CallStatus::from(status)));
+        match status {
             0 => Ok(()),
             other => self.no_plain_success(function, other),
+        }
+    }
+
+    /// Tells the trace, where there is one: each call before it is made, so that the last one is known after a crash.
+    #[inline(always)]
+    pub(super) fn trace(&self, text: fmt::Arguments) {
+        if self.log.is_traced() {
+            self.log.trace(&text);
         }
     }
 
@@ -164,7 +190,10 @@ impl ForeignInstance {
             return Err(self.not_called(function));
         };
         self.log.begin();
-        match run(f, self.component) {
+        self.trace(format_args!("{function}"));
+        let status = run(f, self.component);
+        self.trace(format_args!("  {}", CallStatus::from(status)));
+        match status {
             0 => Ok(CallStatus::Ok),
             other => Ok(other.into()),
         }

@@ -75,6 +75,7 @@ table! {
         setup = "fmi2SetupExperiment": fn(InstanceHandle, c_int, f64, f64, c_int, f64) -> c_int;
         enter_initialization = "fmi2EnterInitializationMode": fn(InstanceHandle) -> c_int;
         exit_initialization = "fmi2ExitInitializationMode": fn(InstanceHandle) -> c_int;
+        set_logging = "fmi2SetDebugLogging": fn(InstanceHandle, c_int, usize, *const Text) -> c_int;
         terminate = "fmi2Terminate": fn(InstanceHandle) -> c_int;
         reset = "fmi2Reset": fn(InstanceHandle) -> c_int;
         get_integer = "fmi2GetInteger": fn(InstanceHandle, *const Vr, usize, *mut c_int) -> c_int;
@@ -118,6 +119,7 @@ table! {
         update_discrete = "fmi3UpdateDiscreteStates": fn(
             InstanceHandle, *mut bool, *mut bool, *mut bool, *mut bool, *mut bool, *mut f64
         ) -> c_int;
+        set_logging = "fmi3SetDebugLogging": fn(InstanceHandle, bool, usize, *const Text) -> c_int;
         terminate = "fmi3Terminate": fn(InstanceHandle) -> c_int;
         reset = "fmi3Reset": fn(InstanceHandle) -> c_int;
         get_f32 = "fmi3GetFloat32": fn(InstanceHandle, *const Vr, usize, *mut f32, usize) -> c_int;

@@ -3,6 +3,7 @@
 use super::intermediate::Updates;
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::{c_char, c_int, c_void};
+use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use terraglue_subsystem::LogLevel;
@@ -19,6 +20,9 @@ pub struct LogLine {
 /// Takes the lines that are let through.
 pub type Sink = Box<dyn Fn(&LogLine) + Send + Sync>;
 
+/// Takes a line for each call.
+pub type Trace = Arc<dyn Fn(&str) + Send + Sync>;
+
 /// Lines of one call that are handed on.
 const PER_CALL: u32 = 20;
 /// Lines of one run that are handed on.
@@ -31,6 +35,8 @@ const LENGTH: usize = 1000;
 /// The log of an instance; its address is the environment of the call-backs.
 pub struct InstanceLog {
     sink: Sink,
+    /// Takes a line for each call of the FMU, where they are traced.
+    trace: Option<Trace>,
     lines: Mutex<LogState>,
     /// Whether anything was said since the last call began; most calls say nothing and need no lock.
     said: AtomicBool,
@@ -73,15 +79,30 @@ impl Drop for InstanceLog {
 
 impl InstanceLog {
     /// A log of the instance `name`.
-    pub fn new(sink: Sink, name: &str) -> Arc<Self> {
+    pub fn new(sink: Sink, trace: Option<Trace>, name: &str) -> Arc<Self> {
         let instance_log = Arc::new(Self {
             sink,
+            trace,
             lines: Mutex::default(),
             said: AtomicBool::new(false),
             updates: Updates::default(),
         });
         logs().insert(Arc::as_ptr(&instance_log) as usize, (name.to_owned(), Arc::downgrade(&instance_log)));
         instance_log
+    }
+
+    /// Whether calls are traced.
+    #[inline]
+    pub fn is_traced(&self) -> bool {
+        self.trace.is_some()
+    }
+
+    /// Tells the trace of a call.
+    #[cold]
+    pub fn trace(&self, text: &dyn Display) {
+        if let Some(trace) = &self.trace {
+            trace(&text.to_string());
+        }
     }
 
     /// A call begins: its lines count anew.
@@ -216,7 +237,7 @@ mod tests {
         let sink = Box::new(move |_: &LogLine| {
             seen.fetch_add(1, Ordering::Relaxed);
         });
-        let instance_log = InstanceLog::new(sink, "flood");
+        let instance_log = InstanceLog::new(sink, None, "flood");
         for call in 0..100 {
             instance_log.begin();
             for k in 0..1000 {
@@ -230,7 +251,7 @@ mod tests {
 
     #[test]
     fn what_is_no_book_is_found_by_name_or_not_at_all() {
-        let instance_log = InstanceLog::new(Box::new(|_| {}), "an instance of this test");
+        let instance_log = InstanceLog::new(Box::new(|_| {}), None, "an instance of this test");
         let log = |environment: usize, name: &CStr| {
             // SAFETY: texts with a zero.
             unsafe {
@@ -240,10 +261,10 @@ mod tests {
         };
         assert_eq!(log(1, c"an instance of this test"), 1);
         assert_eq!(log(Arc::as_ptr(&instance_log) as usize, c"another"), 2);
-        let other = InstanceLog::new(Box::new(|_| {}), "another instance of this test");
+        let other = InstanceLog::new(Box::new(|_| {}), None, "another instance of this test");
         let gone = Arc::as_ptr(&other) as usize;
         drop(other);
-        let third = InstanceLog::new(Box::new(|_| {}), "a third instance of this test");
+        let third = InstanceLog::new(Box::new(|_| {}), None, "a third instance of this test");
         if Arc::as_ptr(&third) as usize != gone {
             assert_eq!(log(gone, c"nobody"), 2);
         }

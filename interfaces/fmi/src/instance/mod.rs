@@ -21,7 +21,7 @@ mod values;
 pub use clocks::Clocks;
 pub use foreign::ForeignInstance;
 pub use intermediate::IntermediateRow;
-pub use log::{LogLine, Sink};
+pub use log::{LogLine, Sink, Trace};
 pub use state::FmuState;
 pub use step::{Advance, Stepped};
 
@@ -55,13 +55,13 @@ unsafe extern "C" {
 /// use terraglue_fmi::InstanceOptions;
 ///
 /// let options = InstanceOptions { event_mode: true, ..InstanceOptions::new("tank", Box::new(|_| ())) };
-/// assert!(options.name == "tank" && !options.verbose && options.followed.is_empty());
+/// assert!(options.name == "tank" && options.log_categories.is_empty() && options.followed.is_empty());
 /// ```
 pub struct InstanceOptions {
     /// Name of the instance.
     pub name: String,
-    /// Whether the FMU shall log details.
-    pub verbose: bool,
+    /// Categories of its log that are switched on; `all` stands for all of them.
+    pub log_categories: Vec<String>,
     /// Whether events are handled in event mode (FMI 3, where the FMU has it).
     pub event_mode: bool,
     /// Variables that are read at intermediate times (FMI 3).
@@ -70,13 +70,23 @@ pub struct InstanceOptions {
     pub followed: Vec<String>,
     /// Where its log goes.
     pub sink: Sink,
+    /// Takes a line for each call, with its values and its status.
+    pub trace: Option<Trace>,
 }
 
 impl InstanceOptions {
     /// Without details in the log, event mode or intermediate times.
     pub fn new(name: impl Into<String>, sink: Sink) -> Self {
-        let (intermediate, followed) = (Vec::new(), Vec::new());
-        Self { name: name.into(), verbose: false, event_mode: false, intermediate, followed, sink }
+        let (intermediate, followed, log_categories) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            name: name.into(),
+            log_categories,
+            event_mode: false,
+            intermediate,
+            followed,
+            sink,
+            trace: None,
+        }
     }
 }
 
@@ -106,8 +116,10 @@ pub struct FmuInstance {
     shown: Vec<u32>,
     /// What may be read or set in intermediate updates.
     announced: Vec<u32>,
-    /// Whether it was said that its clock runs ahead.
-    ran_past: Cell<bool>,
+    /// Whether it was noted that it reports the time of its own solver.
+    own_time: Cell<bool>,
+    /// Whether it was noted that it returns early without the flag.
+    early: Cell<bool>,
     /// Whether it was said that it does not tell how far it came.
     untold: Cell<bool>,
     /// Whether it was said that it changes the floating-point mode.
@@ -139,18 +151,17 @@ impl FmuInstance {
         let updates = description.capabilities.intermediate_update;
         let loaded = fmu.library()?;
         let api = functions::find(fmu, &loaded.library)?;
-        let log = InstanceLog::new(options.sink, &options.name);
+        let log = InstanceLog::new(options.sink, options.trace, &options.name);
         let event_mode = options.event_mode && description.capabilities.event_mode;
         let environment = Arc::as_ptr(&log).cast_mut().cast::<c_void>();
         let text =
             |text: &str| CString::new(text).map_err(|_| Error::Refused(format!("`{text}` has a zero in it")));
         let (name, token) = (text(&options.name)?, text(&description.token)?);
         let path = resources(fmu)?;
-        let modes = (options.verbose, event_mode);
+        let logs = !options.log_categories.is_empty();
+        let modes = (logs, event_mode);
         let (component, callbacks) = match &api {
-            Api::Two(two) => {
-                make_2(two, [&name, &token, &text(&file_uri(&path))?], options.verbose, environment)
-            }
+            Api::Two(two) => make_2(two, [&name, &token, &text(&file_uri(&path))?], logs, environment),
             Api::Three(three) => {
                 let texts = [&name, &token, &text(&format!("{path}/"))?];
                 (make_3(three, description, texts, modes, &announced, environment), None)
@@ -164,7 +175,7 @@ impl FmuInstance {
             return Err(Error::Call { function, outcome, log: log.last(), fatal: true });
         }
         let clocks = Clocks::new(&description.variables, event_mode, &log);
-        Ok(Self {
+        let instance = Self {
             phase: InstancePhase::Instantiated,
             event_mode,
             updates,
@@ -174,11 +185,45 @@ impl FmuInstance {
             start: 0.0,
             shown,
             announced,
-            ran_past: Cell::new(false),
+            own_time: Cell::new(false),
+            early: Cell::new(false),
             untold: Cell::new(false),
             mode_told: Cell::new(false),
             fmu: fmu.clone(),
-        })
+        };
+        if logs {
+            instance.log_only(&options.log_categories)?;
+        }
+        Ok(instance)
+    }
+
+    /// Switches categories of the log on, and all others off; `all` leaves them all on.
+    fn log_only(&self, categories: &[String]) -> Result {
+        if categories.iter().any(|c| c == "all") {
+            return Ok(());
+        }
+        let known = &self.description.log_categories;
+        if let Some(unknown) = categories.iter().find(|c| !known.contains(c)) {
+            let offered = match known.is_empty() {
+                true => "offers `all` only".to_owned(),
+                false => format!("offers {}, and `all`", known.join(", ")),
+            };
+            return Err(Error::WrongInput(format!(
+                "there is no log category `{unknown}`: the FMU {offered}"
+            )));
+        }
+        let text = |c: &String| CString::new(c.as_str()).map_err(|_| Error::Refused(c.clone()));
+        let texts = categories.iter().map(text).collect::<Result<Vec<_>>>()?;
+        let pointers: Vec<*const c_char> = texts.iter().map(|t| t.as_ptr()).collect();
+        let (count, first) = (pointers.len(), pointers.as_ptr());
+        match self.foreign.api {
+            Api::Two(two) => self
+                .foreign
+                .call("fmi2SetDebugLogging", two.set_logging, |f, c| unsafe { f(c, 1, count, first) }),
+            Api::Three(three) => self
+                .foreign
+                .call("fmi3SetDebugLogging", three.set_logging, |f, c| unsafe { f(c, true, count, first) }),
+        }
     }
 
     /// A warning of the host's about the FMU, among the lines that it logs.
@@ -280,6 +325,7 @@ impl FmuInstance {
         if self.updates {
             self.foreign.log.updates.watch(&self.shown, &self.description);
         }
+        self.foreign.trace(format_args!("from {start:?} s to {stop:?} s, tolerance {tolerance:?}"));
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         match self.foreign.api {

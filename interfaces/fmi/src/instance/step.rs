@@ -13,7 +13,7 @@ const DO_STEP_3: &str = "fmi3DoStep";
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated` of `fmi2StatusKind`.
 const TERMINATED: c_int = 3;
-/// How far past the end of a step an FMU may say it is, as a share of the step: some round to a grid of their own.
+/// Largest time past the end of a step that an FMU without `fixedInternalStepSize` may report, as a share of the step.
 const PAST: f64 = 1e-3;
 /// What stands in `lastSuccessfulTime` before a step, a NaN of its own: does the FMU write there at all?
 const UNTOLD: f64 = f64::from_bits(0x7ff8_756e_746f_6c64);
@@ -42,6 +42,16 @@ pub struct Stepped {
     pub terminate: bool,
     /// Events that were handled.
     pub events: u32,
+}
+
+/// Where a part of a step has ended.
+enum PartEnd {
+    /// At the time that was asked for.
+    Stop,
+    /// Before it, where the FMU goes on.
+    Before,
+    /// At a time that no step ends at.
+    Wrong,
 }
 
 /// How a part of a step ended (FMI 3).
@@ -74,6 +84,7 @@ impl FmuInstance {
         let for_good = c_int::from(step.for_good);
         let mode = Mode::now();
         // SAFETY: the arguments are those of the standard.
+        self.foreign.trace(format_args!("from {:?} s by {:?} s", step.t, step.h));
         let status =
             self.foreign.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) });
         if mode.restore() {
@@ -178,6 +189,7 @@ impl FmuInstance {
             self.foreign.log.updates.open(t, stop, self.foreign.address(), get_f64);
         }
         let mode = Mode::now();
+        self.foreign.trace(format_args!("from {t:?} s by {:?} s", stop - t));
         let status = self.foreign.status(NAME, do_step, |f, c| unsafe {
             f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
         });
@@ -199,16 +211,42 @@ impl FmuInstance {
         if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
             last = untold(self, stop);
         }
-        let past = last > stop + tolerance && last - stop <= PAST * step.h;
-        if past {
-            runs_ahead(self, last, stop);
-        }
-        let at_stop = past || (last - stop).abs() <= tolerance;
-        if !at_stop && !early || last.is_nan() || last < t - tolerance || last > stop + tolerance && !past {
-            let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
-            return Err(self.foreign.lied(NAME, outcome));
-        }
+        let ended = self.part_end((t, stop), last, early || terminate, tolerance);
+        let at_stop = match ended {
+            PartEnd::Stop => true,
+            PartEnd::Before => false,
+            PartEnd::Wrong => {
+                let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
+                return Err(self.foreign.lied(NAME, outcome));
+            }
+        };
         Ok(StepPart { event, terminate, last, at_stop })
+    }
+
+    /// Where a part of a step from t to `stop` has ended whose `lastSuccessfulTime` is `last`.
+    ///
+    /// An FMU with a solver step of its own (`fixedInternalStepSize`) may report the time of its solver, which is up to one of
+    /// these steps away from the communication point that it has reached: the Reference FMUs do. Any other FMU that reports an
+    /// earlier time has returned early, whether it says so or not, and is continued from there.
+    fn part_end(&self, (t, stop): (f64, f64), last: f64, early: bool, tolerance: f64) -> PartEnd {
+        let off = last - stop;
+        if off.abs() <= tolerance {
+            return PartEnd::Stop;
+        }
+        if early && last >= t - tolerance && last < stop {
+            return PartEnd::Before;
+        }
+        let own = self.description.capabilities.fixed_step.unwrap_or(0.0);
+        // the times of such a solver are sums of its steps
+        if off.abs() <= own * (1.0 + 1e-6) || (0.0..=PAST * (stop - t)).contains(&off) {
+            own_time(self, last, stop);
+            return PartEnd::Stop;
+        }
+        if last > t && last < stop {
+            returned_early(self, last, stop);
+            return PartEnd::Before;
+        }
+        PartEnd::Wrong
     }
 
     /// Event mode at `now`, with the clocks that tick there at the end of a part; whether the FMU asks for the end.
@@ -302,11 +340,26 @@ fn mode_changed(instance: &FmuInstance, function: &str) {
     }
 }
 
-/// Notes once that the clock of the FMU is ahead of the step.
+/// Notes once that the FMU reports the time of its own solver.
 #[cold]
-fn runs_ahead(instance: &FmuInstance, last: f64, stop: f64) {
-    if !instance.ran_past.replace(true) {
-        let text = format!("says that it came to t = {last} s in a step to {stop} s; taken as {stop} s");
+fn own_time(instance: &FmuInstance, last: f64, stop: f64) {
+    if !instance.own_time.replace(true) {
+        let text = format!(
+            "{DO_STEP_3} reports the time {last} s of its own solver (lastSuccessfulTime) in a step to {stop} s; the step counts \
+             as made, and its outputs are those of its solver"
+        );
+        instance.foreign.log.note(&text);
+    }
+}
+
+/// Notes once that the FMU returns early without the flag.
+#[cold]
+fn returned_early(instance: &FmuInstance, last: f64, stop: f64) {
+    if !instance.early.replace(true) {
+        let text = format!(
+            "{DO_STEP_3} came to t = {last} s in a step to {stop} s (lastSuccessfulTime) without earlyReturn; it is continued \
+             from there"
+        );
         instance.foreign.log.note(&text);
     }
 }

@@ -23,6 +23,13 @@ impl ForeignInstance {
     /// [`Error::Refused`]: fewer values than references. [`Error::Call`]: the FMU failed.
     #[inline(always)]
     pub fn get_f64(&self, references: &[u32], out: &mut [f64]) -> Result {
+        self.read_f64(references, out)?;
+        self.trace(format_args!("  {references:?}: {out:?}"));
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn read_f64(&self, references: &[u32], out: &mut [f64]) -> Result {
         match &self.api {
             Api::Two(two) => {
                 if out.len() < references.len() {
@@ -42,6 +49,7 @@ impl ForeignInstance {
     /// [`Error::Refused`]: fewer values than references. [`Error::Call`]: the FMU refuses a value or failed.
     #[inline(always)]
     pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
+        self.trace(format_args!("{references:?} = {values:?}"));
         match &self.api {
             Api::Two(two) => {
                 if values.len() < references.len() {
@@ -63,6 +71,7 @@ impl ForeignInstance {
         if let ValuesMut::F64(out) = out {
             return self.get_f64(references, out);
         }
+        self.trace(format_args!("values of {references:?}"));
         match self.api {
             Api::Two(..) => self.get_2(references, out),
             Api::Three(..) => self.get_3(references, out),
@@ -78,6 +87,7 @@ impl ForeignInstance {
         if let Values::F64(values) = values {
             return self.set_f64(references, values);
         }
+        self.trace(format_args!("{references:?} = {values:?}"));
         match self.api {
             Api::Two(..) => self.set_2(references, values),
             Api::Three(..) => self.set_3(references, values),

@@ -9,8 +9,10 @@ mod model;
 mod parameters;
 mod structure;
 mod transformation;
+mod write;
 
 pub use model::*;
+pub use write::{NewComponent, NewConnection, describe};
 
 use crate::archive::{Archive, Limits};
 use crate::error::{Error, Result};

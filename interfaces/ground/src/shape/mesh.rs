@@ -37,7 +37,7 @@ fn is_closed(triangles: &[[u32; 3]]) -> bool {
     edges(false) == edges(true)
 }
 
-/// Where a vertical line meets a mesh for the first time from below.
+/// First intersection of a vertical line with a mesh, from below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hit {
     /// Height above the origin of the mesh, m.
@@ -169,8 +169,8 @@ impl Branch {
 }
 
 impl Triangle {
-    /// Where the line at `at` meets it. Lines through a common edge meet at least one of its two triangles: both reckon it
-    /// with the same numbers.
+    /// Intersection with the line at `at`. Lines through a common edge meet at least one of its two triangles: both
+    /// reckon it with the same numbers.
     fn hit(&self, rotation: &Rotation, at: [f64; 2]) -> Option<Hit> {
         let normal = rotation.to_world(self.normal);
         if normal[2].abs() <= WALL * dot(normal, normal).sqrt() {

@@ -14,7 +14,7 @@ pub(super) struct ExportedDescriptions {
     pub(super) scene: SceneTable,
     pub(super) fields: Vec<TgField>,
     pub(super) streams: Vec<TgStream>,
-    /// What the pointers above point at; moved or dropped only with the whole.
+    /// Data behind the pointers above; moved or dropped only with the whole.
     _keep: Keep,
 }
 

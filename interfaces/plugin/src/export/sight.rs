@@ -1,4 +1,4 @@
-//! What a Rust module that sees is shown: [`World`] on top of the host's table; and what it shows: streams and overlays.
+//! Sight of Rust modules: [`World`] on top of the host's table; and their streams and overlays.
 
 use super::data::list;
 use super::steps::step_of;
@@ -15,7 +15,7 @@ use terraglue_subsystem::{
     ShapeRef, World,
 };
 
-/// What was copied of a host's names and scenes; made once for each revision of the world.
+/// Copies of a host's names and scenes; made once for each revision of the world.
 #[derive(Default)]
 pub(super) struct Known {
     revision: Option<u64>,

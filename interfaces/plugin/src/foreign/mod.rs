@@ -171,7 +171,8 @@ impl ForeignModule {
     /// Makes an instance; `config` is complete (`Config::with_defaults`).
     ///
     /// # Errors
-    /// What the module answers. [`Error::Refused`]: it is a law. [`Error::Fatal`]: it reports success and made no instance.
+    /// Errors of the module. [`Error::Refused`]: it is a law. [`Error::Fatal`]: it reports success and made no
+    /// instance.
     pub fn instantiate(&self, config: &Config, host: Arc<dyn Host>) -> Result<ForeignSubsystem> {
         let Some(instantiate) = self.table.instantiate else {
             let text = "it is a law, not a subsystem: name it in `[soil.law] plugin` of a soil";

@@ -84,7 +84,7 @@ impl Services {
         &raw const self.table
     }
 
-    /// What a law of the host has said since this was asked last; `text`, the module's own words, where it said nothing.
+    /// Message of a law of the host since the last call; `text`, the module's own words, if there is none.
     pub(super) fn said(&self, text: String) -> String {
         self.hosted_law.as_ref().and_then(HostedLaw::words).unwrap_or(text)
     }

@@ -1,4 +1,4 @@
-//! What an instance that sees is shown: a [`World`] of the host behind a table of the C ABI.
+//! Sight of an instance: a [`World`] of the host behind a table of the C ABI.
 
 use crate::abi::*;
 use crate::field_table::{field_out, tile_out};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use terraglue_subsystem::*;
 
-/// What the module is asked to do wrong, by its parameter `fault`.
+/// Fault that the module commits, from its parameter `fault`.
 #[derive(Clone, Copy, PartialEq)]
 enum Fault {
     None,

@@ -30,7 +30,7 @@ mod tests {
         assert_eq!(project(0.5, [-1.0, 0.0, 1.0]), [0.0; 3]);
         let p = project(0.5, [1.0, 0.0, 2.0]);
         assert!((p[2] - 0.5 * p[0]).abs() < 1e-15);
-        // What is left over is orthogonal to the generator (1, μ).
+        // The remainder is orthogonal to the generator (1, μ).
         assert!(((1.0 - p[0]) + 0.5 * (2.0 - p[2])).abs() < 1e-15);
         assert_eq!(project(0.0, [1.0, 3.0, 0.0]), [1.0, 0.0, 0.0]);
         assert_eq!(project(0.0, [-1.0, 0.0, 0.0]), [0.0; 3]);

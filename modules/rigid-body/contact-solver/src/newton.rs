@@ -48,7 +48,7 @@ enum Branch {
     },
 }
 
-/// How a run of Newton steps ended.
+/// Outcome of a run of Newton steps.
 pub(crate) struct Run {
     pub steps: u32,
     pub halvings: u32,

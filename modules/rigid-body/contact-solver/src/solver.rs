@@ -41,7 +41,7 @@ pub enum Stage {
     Proximal,
 }
 
-/// What a solution took and how good it is.
+/// Effort and quality of a solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// Residual of the impulses returned, see [`Problem::residual`].

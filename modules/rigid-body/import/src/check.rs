@@ -47,7 +47,7 @@ pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Option<Inertial>,
         return Err(source.link(&link.name, not_positive(mass)));
     }
     in_range(mass, &tensor).map_err(|problem| source.link(&link.name, problem))?;
-    // What rounding leaves of a 0, on either side, is none; a little below 0 beside larger ones is repaired.
+    // A value within rounding of 0, on either side, counts as none; a little below 0 beside larger ones is repaired.
     let largest = tensor.amax();
     let tensor = if largest <= SMALLEST { Matrix3::zeros() } else { tensor };
     let least = -(ROUNDING * largest).max(SMALLEST);

@@ -1,4 +1,4 @@
-//! What can be wrong with a robot file; every message names the place, the value and a way out.
+//! Errors of robot files; every message names the place, the value and a way out.
 
 /// A robot file that cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -9,7 +9,7 @@ pub enum Error {
     Read {
         /// Path.
         file: String,
-        /// What the operating system said.
+        /// Message of the operating system.
         reason: String,
     },
     /// The text is not URDF or MJCF.
@@ -19,7 +19,7 @@ pub enum Error {
         file: String,
         /// Line, from 1; 0: unknown.
         line: usize,
-        /// What the reader said.
+        /// Message of the reader.
         reason: String,
     },
     /// A link is wrong.
@@ -63,7 +63,7 @@ pub enum Error {
     Strict {
         /// The first warning, with its place.
         first: String,
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// Links and joints do not form one tree.
@@ -71,7 +71,7 @@ pub enum Error {
     Tree {
         /// Path.
         file: String,
-        /// What is not a tree and a way out.
+        /// The defect of the tree and a way out.
         problem: String,
     },
 }

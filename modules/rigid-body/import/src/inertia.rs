@@ -49,8 +49,8 @@ pub(crate) fn in_range(mass: f64, tensor: &Matrix3<f64>) -> Result<(), String> {
     }
 }
 
-/// What is wrong with a tensor; none: a body can have it. Principal moments are positive and each at most the sum of the
-/// others (with 1e-6 for rounding in files).
+/// Defect of a tensor; none: a body can have it. Principal moments are positive and each at most the sum of the others
+/// (with 1e-6 for rounding in files).
 pub(crate) fn flaw(tensor: &Matrix3<f64>) -> Option<String> {
     if *tensor == Matrix3::zeros() {
         return Some(
@@ -82,7 +82,7 @@ pub(crate) fn shown(tensor: &Matrix3<f64>) -> String {
 fn moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
     let mut p = SymmetricEigen::new(*tensor).eigenvalues;
     p.as_mut_slice().sort_by(f64::total_cmp);
-    // What rounding leaves of a 0 is none.
+    // A value within rounding of 0 counts as none.
     let largest = p.amax();
     p.map(|moment| if moment.abs() <= 1e-15 * largest { 0.0 } else { moment })
 }

@@ -1,9 +1,9 @@
 //! Reads robot files (URDF, xacro, MJCF) into a checked tree of bodies, joints and shapes.
 //!
-//! What comes out can be simulated: every body has a physical mass and inertia, the joints form a tree, links
-//! that cannot stand alone are merged into the link to which they are fixed. What a simulation can live with is a warning
-//! that says which value is used instead; what it cannot is refused with file, line, link or joint, the offending value
-//! and a way out.
+//! The result can be simulated: every body has a physical mass and inertia, the joints form a tree, links that cannot
+//! stand alone are merged into the link to which they are fixed. A defect that a simulation can live with is a warning
+//! that names the value used instead; any other is refused with file, line, link or joint, the offending value and a
+//! way out.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]
@@ -43,7 +43,7 @@ pub use urdf::read_urdf_text;
 use error::Source;
 use std::path::{Path, PathBuf};
 
-/// How a file is read.
+/// Options of reading a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// A root link of URDF without mass is the world; one with mass the caller fixes.

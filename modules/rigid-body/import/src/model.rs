@@ -9,7 +9,7 @@ use std::sync::Arc;
 pub struct Robot {
     /// Name in the file.
     pub name: String,
-    /// How the root stands in the world.
+    /// Connection of the root to the world.
     pub base: Base,
     /// Bodies, each after its parent.
     pub bodies: Vec<Body>,
@@ -27,9 +27,9 @@ pub struct Robot {
     pub couplings: Vec<Coupling>,
     /// Connections beyond the tree, closed in the pose of the file.
     pub loops: Vec<Loop>,
-    /// What the file says that has no effect, with its place.
+    /// Content of the file that has no effect, with its place.
     pub warnings: Vec<String>,
-    /// What was made of the file where there was a choice, with its place.
+    /// Choices that were made in reading the file, with their place.
     pub notices: Vec<String>,
 }
 
@@ -92,7 +92,7 @@ pub struct Body {
     pub com: Vector3<f64>,
     /// Inertia about the centre of mass in the axes of the body frame, kg m².
     pub inertia: Matrix3<f64>,
-    /// What can be seen or hit.
+    /// Shapes that can be seen or hit.
     pub shapes: Vec<Shape>,
 }
 
@@ -149,7 +149,7 @@ pub enum ShapeGeometry {
         /// Radius.
         radius: f64,
     },
-    /// What is inside all faces of a convex mesh.
+    /// Inside of all faces of a convex mesh.
     Hull(Arc<Mesh>),
     /// A mesh that is not convex and moves.
     Concave {
@@ -194,11 +194,11 @@ pub struct Joint {
     pub axis: Unit<Vector3<f64>>,
     /// Smallest and largest coordinate, rad or m; none: unlimited.
     pub limits: Option<[f64; 2]>,
-    /// What acts along it unless the scenario says otherwise.
+    /// Forces along it unless the scenario sets others.
     pub data: AxisData,
 }
 
-/// What acts along the axis of a joint; units of a joint that turns.
+/// Forces and limits along the axis of a joint; units of a joint that turns.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct AxisData {
     /// Viscous friction, N m s/rad.
@@ -220,7 +220,7 @@ pub struct AxisData {
 /// A motor as the file describes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// How it is driven.
+    /// Kind of its drive.
     pub kind: DriveKind,
     /// Of a position motor, N m/rad.
     pub stiffness: f64,
@@ -230,7 +230,7 @@ pub struct Drive {
     pub max_torque: Option<f64>,
 }
 
-/// How a motor is driven.
+/// Kind of drive of a motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveKind {
     /// To a coordinate, by stiffness and damping.
@@ -241,7 +241,7 @@ pub enum DriveKind {
     Torque,
 }
 
-/// What a joint leaves free.
+/// Freedoms of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Turns about its axis.

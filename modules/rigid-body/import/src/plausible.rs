@@ -8,7 +8,7 @@ const MASSES: [f64; 2] = [1e-10, 1e6];
 /// Smallest and largest part, m.
 const SIZES: [f64; 2] = [1e-6, 100.0];
 
-/// What is doubtful about the mass of a body, and how far off its centre it lies.
+/// Doubts about the mass of a body and the distance of its centre.
 pub(crate) fn body(own: &Inertial) -> Option<String> {
     let [lightest, heaviest] = MASSES;
     if !(lightest..=heaviest).contains(&own.mass) {
@@ -34,7 +34,7 @@ pub(crate) fn body(own: &Inertial) -> Option<String> {
     })
 }
 
-/// What is doubtful about the size of a shape.
+/// Doubts about the size of a shape.
 pub(crate) fn shape(geometry: &ShapeGeometry) -> Option<String> {
     let (size, [smallest, largest]) = (extent(geometry)?, SIZES);
     (!(smallest..=largest).contains(&size)).then(|| {

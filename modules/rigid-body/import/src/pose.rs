@@ -4,7 +4,7 @@ use crate::inertia::Inertial;
 use crate::model::{Base, Joint, JointKind, Robot, Shape, ShapeGeometry};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// What all bodies are together, in the frame of the file.
+/// Mass properties of all bodies together, in the frame of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TotalMass {
     /// kg.
@@ -29,7 +29,7 @@ impl Joint {
         self.parent_from_joint * moved * self.child_from_joint.inverse()
     }
 
-    /// How many freedoms it leaves.
+    /// Number of its freedoms.
     pub fn freedoms(&self) -> usize {
         match self.kind {
             JointKind::Fixed => 0,

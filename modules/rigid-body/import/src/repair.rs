@@ -1,4 +1,4 @@
-//! What stands in for an inertia tensor that no body can have.
+//! Replacement of an inertia tensor that no body can have.
 
 use crate::inertia::{flaw, shown};
 use crate::model::{Body, Shape};
@@ -40,7 +40,7 @@ fn nearest(tensor: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_diagonal_element(covariance.trace()) - covariance
 }
 
-/// What hits, else what is seen, filled evenly; else a small ball.
+/// Inertia of the collision shapes, else of the visual ones, filled evenly; else of a small ball.
 fn in_place_of_none(mass: f64, shapes: &[Shape]) -> (Matrix3<f64>, &'static str) {
     let of = |collides: bool| evenly(mass, shapes.iter().filter(move |s| s.collides == collides));
     match of(true).or_else(|| of(false)).filter(|i| flaw(&i.tensor).is_none()) {

@@ -23,7 +23,7 @@ pub(crate) struct Shapes<'a> {
     odd: Vec<String>,
 }
 
-/// Where a shape stands in the file.
+/// Place of a shape in the file.
 #[derive(Clone, Copy)]
 struct ShapePlace<'a> {
     link: &'a Link,

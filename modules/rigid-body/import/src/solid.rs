@@ -1,4 +1,4 @@
-//! What shapes weigh when they are filled evenly.
+//! Mass properties of shapes that are filled evenly.
 
 use crate::inertia::Inertial;
 use crate::mesh::Solid;

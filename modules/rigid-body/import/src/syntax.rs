@@ -1,4 +1,4 @@
-//! What can be said about the text of a URDF file with a line, before `urdf-rs` reads it: its messages have no place.
+//! Checks of the text of a URDF file, with lines, before `urdf-rs` reads it: its messages have no place.
 
 use crate::error::{Error, Source};
 use crate::values::{self, check_name};

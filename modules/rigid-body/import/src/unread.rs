@@ -1,4 +1,5 @@
-//! What a URDF file says that nothing reads: each kind of element and attribute is named once, none is dropped silently.
+//! Content of a URDF file that nothing reads: each kind of element and attribute is named once, none is dropped
+//! silently.
 
 use crate::error::Source;
 use roxmltree::{Document, Node};

@@ -196,7 +196,7 @@ fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Resul
     Ok(all)
 }
 
-/// What is doubtful about the masses of the bodies, together and one by one.
+/// Doubts about the masses of the bodies, together and one by one.
 fn doubtful(source: &Source, bodies: &[Body]) -> impl Iterator<Item = String> {
     let odd = bodies.iter().filter_map(|Body { name, mass, com, inertia, .. }| {
         let odd = plausible::body(&Inertial { mass: *mass, com: *com, tensor: *inertia })?;

@@ -1,5 +1,5 @@
-//! What holds for the attributes of both formats: numbers are finite and of a size that can be computed with, names are
-//! not empty.
+//! Checks of the attributes of both formats: numbers are finite and of a size that can be computed with, names are not
+//! empty.
 //!
 //! Every attribute is looked at, also those that only some models have, and those of default classes that nothing uses yet: a
 //! `nan` is never meant.
@@ -48,7 +48,7 @@ const OPEN_ENDED: [&str; 8] =
 /// Products of three such numbers are still finite.
 pub(crate) const LARGEST: f64 = 1e100;
 
-/// What is wrong with the numbers or the name of an element.
+/// Checks the numbers and the name of an element.
 pub(crate) fn check(node: Node) -> Result<(), String> {
     for attribute in node.attributes() {
         let (name, text) = (attribute.name(), attribute.value());
@@ -74,7 +74,7 @@ pub(crate) fn check(node: Node) -> Result<(), String> {
     Ok(())
 }
 
-/// What is wrong with the name of an element; none at all is right here.
+/// Checks the name of an element; no name at all is right here.
 pub(crate) fn check_name(node: Node) -> Result<(), String> {
     match node.attribute("name") {
         Some(name) if name.trim().is_empty() => Err(format!(

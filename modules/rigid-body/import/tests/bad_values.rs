@@ -108,7 +108,7 @@ fn numbers_that_cannot_be_computed_with_are_refused() {
         &changed("m.xml", MJCF, "mass=\"4\"", "mass=\"1e308\""),
         &["m.xml:9: inertial: mass", "beyond 1e100"],
     );
-    // What sizes and densities make together.
+    // The product of sizes and densities.
     let message = changed("m.xml", MJCF, "size=\"0.1\" mass=\"3\"", "size=\"1e40\"");
     says(&message, &["m.xml:7: body `a`", "mass 4.1", "e122 kg", "check its unit"]);
     says(

@@ -1,5 +1,5 @@
-//! What public robots get wrong and a simulation can live with: one minimal robot per defect. Each loads with a warning that
-//! says where, what, and which value is used instead.
+//! Defects of public robots that a simulation can live with: one minimal robot per defect. Each loads with a warning
+//! that names the place, the defect and the value used instead.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use nalgebra::Matrix3;
@@ -174,7 +174,7 @@ fn a_link_without_inertia_gets_that_of_its_shapes() {
     }
 }
 
-/// What rounding leaves of a 0, on either side: icub.
+/// Moments within rounding of 0, on either side: icub.
 #[test]
 fn moments_a_rounding_below_0_are_repaired() {
     for tensor in [[-5e-20, 0.0, 0.0, 0.0, 0.0, 0.0], [-1e-13, 0.0, 0.0, 0.02, 0.0, 0.02]] {
@@ -227,7 +227,7 @@ fn a_binary_stl_that_begins_with_solid_is_binary() {
     assert!(robot.warnings.is_empty(), "{:?}", robot.warnings);
 }
 
-/// What no simulation can live with stays an error, and `strict` makes one of every warning.
+/// A defect that no simulation can live with stays an error, and `strict` makes one of every warning.
 #[test]
 fn what_is_broken_is_refused_by_name() {
     let moving = |mass: f64, tensor: [f64; 6]| {
@@ -277,8 +277,8 @@ fn strict_refuses_where_there_is_a_warning() {
     }
 }
 
-/// What other readers bear: prefixes that nothing declares, an inertial without inertia, a texture without a file, a fixed joint that
-/// follows, shapes of size 0.
+/// Defects that other readers accept: prefixes that nothing declares, an inertial without inertia, a texture without a
+/// file, a fixed joint that follows, shapes of size 0.
 #[test]
 fn what_other_readers_bear_is_borne() {
     let parts = [
@@ -307,7 +307,7 @@ fn what_other_readers_bear_is_borne() {
     }
 }
 
-/// Where a foot is fixed to its shank, it overlaps what the shank hangs on, too: they never touch.
+/// A foot that is fixed to its shank overlaps the parent of the shank, too: they never touch.
 #[test]
 fn bodies_across_fixed_joints_never_touch() {
     let robot = read(&[
@@ -323,7 +323,7 @@ fn bodies_across_fixed_joints_never_touch() {
     assert_eq!(robot.excluded, [[0, 2], [1, 3]]);
 }
 
-/// What hangs from a link called `world` stands still; its mass does not count.
+/// A link that hangs from one called `world` stands still; its mass does not count.
 #[test]
 fn what_is_fixed_to_the_world_stands_still() {
     let robot = read(&[

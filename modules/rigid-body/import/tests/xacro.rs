@@ -53,7 +53,7 @@ fn a_file_is_expanded_where_the_package_is_there_and_told_how_to_get_it_otherwis
     // Without the package the error says which one, and how to name it.
     let message = read_robot(&arm, &Options::default()).unwrap_err().to_string();
     assert!(message.contains("no package parts") && message.contains("packages = { parts ="), "{message}");
-    // What is wrong in the expanded text has a line there.
+    // An error in the expanded text has a line there.
     let wrong = folder("arm").join("wrong.xacro");
     std::fs::write(&wrong, ARM.replace("value=\"2.5\"", "value=\"-1\"")).unwrap();
     let message = read_robot(&wrong, &options).unwrap_err().to_string();

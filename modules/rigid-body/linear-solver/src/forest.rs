@@ -13,7 +13,7 @@ use crate::spatial::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-/// What can go wrong.
+/// Errors of the factorisation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -28,7 +28,7 @@ pub enum Error {
     Pivot {
         /// Index of the body.
         body: usize,
-        /// What should have been positive.
+        /// The pivot that should have been positive.
         pivot: f64,
     },
     /// The system of the rows that close loops cannot be factored.
@@ -39,7 +39,7 @@ pub enum Error {
     NotFinite,
 }
 
-/// How a body hangs in its tree.
+/// Connection of a body to its tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
     /// The body above; none: the world, or nothing.
@@ -415,7 +415,7 @@ impl Node {
         if let Some(asked) = self.asked(&at(x, row_at)) {
             add(&mut v, 1.0, &asked);
         }
-        // What the joint carries: Jᵀμ = p − A·v.
+        // Impulse of the joint: Jᵀμ = p − A·v.
         let mut carried = p;
         add(&mut carried, -1.0, &times(&self.inertia, &v));
         let along = self.rows.along(&carried);

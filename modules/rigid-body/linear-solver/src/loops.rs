@@ -162,7 +162,7 @@ impl Loops {
         }
     }
 
-    /// What the rows feel of a body's answer, as vector z with z_a·z_b to be taken from y_a·y_b.
+    /// Effect of a body's answer on the rows, as vector z with z_a·z_b to be taken from y_a·y_b.
     pub fn feel(&self, forest: &Forest, body: usize, y: &[f64], z: &mut [f64]) {
         for i in 0..self.cuts.len() {
             let felt = |(b, x): (usize, &[f64])| sum(forest.shared(body, b), x, y);

@@ -16,7 +16,7 @@ impl Path {
         tree.loops().len() + tree.forest().path_len(body)
     }
 
-    /// How many entries the vectors of two bodies have in common; 0: nothing connects them.
+    /// Number of entries that the vectors of two bodies have in common; 0: nothing connects them.
     pub fn shared(tree: &Tree, a: usize, b: usize) -> usize {
         tree.loops().len() + tree.forest().shared(a, b)
     }

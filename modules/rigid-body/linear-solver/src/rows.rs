@@ -79,7 +79,7 @@ impl Rows {
         [slide.x, slide.y, slide.z, turn.x, turn.y, turn.z]
     }
 
-    /// What a wrench on the child does along each row: motion(r)·wrench.
+    /// Components of a wrench on the child along each row: motion(r)·wrench.
     #[inline]
     pub(crate) fn along(&self, wrench: &[f64; 6]) -> [f64; 6] {
         let (force, moment) = split(wrench);

@@ -32,7 +32,7 @@ impl Tree {
         self.forest.len() + cut
     }
 
-    /// How many rows of loops say nothing that the others do not say, at the last factorisation.
+    /// Number of rows of loops that depend on the others, at the last factorisation.
     pub fn redundant(&self) -> usize {
         self.loops.redundant()
     }

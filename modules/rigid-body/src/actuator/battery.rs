@@ -1,4 +1,4 @@
-//! What feeds all motors of a robot: an ideal source, or a battery with an open-circuit voltage over its charge and an
+//! Supply of all motors of a robot: an ideal source, or a battery with an open-circuit voltage over its charge and an
 //! internal resistance.
 //!
 //! U = U0(charge) − R·I with P = U·I, the upper root of U² − U0·U + R·P = 0. The motors of a step see the voltage that
@@ -31,7 +31,7 @@ pub(crate) struct Supply {
     pub missing: f64,
 }
 
-/// What the motors drew in a step.
+/// Energy and charge that the motors drew in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Draw {
     /// All power, W.

@@ -64,7 +64,7 @@ pub(crate) fn parameters() -> Vec<Parameter> {
     all
 }
 
-/// What a parameter says of a joint: one value for all, or the one of the best pattern.
+/// Value of a parameter for a joint: one value for all, or the one of the best pattern.
 pub(crate) fn for_joint<'a>(value: &'a Value, joint: &str) -> Option<&'a Value> {
     let Value::Object(table) = value else { return Some(value) };
     let fits = table.iter().filter(|(pattern, _)| matches(pattern, joint));

@@ -48,7 +48,7 @@ impl Line {
     }
 }
 
-/// What makes a piece or a kink of a curve what it is; the next step starts looking there.
+/// Identity of a piece or a kink of a curve; the next step starts looking there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tag {
     /// The motor follows its law.
@@ -79,7 +79,7 @@ struct Piece {
     tag: Tag,
 }
 
-/// Where on a curve an axis is.
+/// Position of an axis on a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mode {
     /// Not known yet.
@@ -167,7 +167,7 @@ impl Curve {
         curve
     }
 
-    /// What the line at a rate is.
+    /// Tag of the line at a rate.
     pub fn tag_at(&self, u: f64) -> Tag {
         self.pieces[self.index_at(u)].tag
     }
@@ -343,7 +343,7 @@ impl Curve {
         1e-13 * (size(i) + size(k))
     }
 
-    /// Where the axis is at a rate.
+    /// Position of the axis at a rate.
     fn locate(&self, u: f64) -> Mode {
         let i = self.index_at(u);
         let line = self.pieces[i].line.at_zero;

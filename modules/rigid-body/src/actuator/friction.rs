@@ -9,7 +9,7 @@
 use super::curve::{Curve, Line, Tag};
 use super::{Actuator, Item};
 
-/// Where the polygon has its corners, as h·σ0·|u|/g: at least this, and that times `FAR`.
+/// Corners of the polygon, as h·σ0·|u|/g: at least this, and that times `FAR`.
 const NEAR: f64 = 0.05;
 const FAR: f64 = 20.0;
 

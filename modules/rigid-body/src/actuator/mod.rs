@@ -25,7 +25,7 @@ pub(crate) mod winding;
 pub(crate) use settings::{Item, SETTINGS, Setting};
 use std::ops::Index;
 
-/// How electrical power follows from mechanical power.
+/// Relation of electrical to mechanical power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Drivetrain {
     /// Gives any torque at any rate without a loss.

@@ -14,7 +14,7 @@ pub(crate) struct Setting {
     pub help: &'static str,
 }
 
-/// What values are accepted.
+/// Range of the values that are accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Range {
     NotNegative,

@@ -1,4 +1,4 @@
-//! What connects bodies beyond the tree of joints: loop closures, rods, springs and dampers, couplings of two joints.
+//! Connections of bodies beyond the tree of joints: loop closures, rods, springs and dampers, couplings of two joints.
 //!
 //! Each of them is one or more rows on up to four bodies. A row has a value (how far it is open, m or rad; for a
 //! spring its length) and the Jacobian of that value. All values are bilinear in positions and body-fixed directions
@@ -21,7 +21,7 @@ pub(crate) struct Closure {
     pub law: ClosureLaw,
 }
 
-/// What it asks for.
+/// Law of a closure.
 #[derive(Clone, Debug)]
 pub(crate) enum ClosureLaw {
     /// The rigid rows of a joint.
@@ -115,7 +115,7 @@ impl Points {
 }
 
 impl Closure {
-    /// How many rows it has.
+    /// Number of its rows.
     pub fn len(&self) -> usize {
         match &self.law {
             ClosureLaw::Joint(joint) => joint.rigid().iter().filter(|r| **r).count(),

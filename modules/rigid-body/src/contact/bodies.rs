@@ -31,7 +31,7 @@ const REFUSE: f64 = 1e-3;
 const OPTIONS: Options =
     Options { tolerance: 1e-11, newton_steps: 30, turns: 6, sweeps: 3, proximal_steps: 20, softening: 1e-9 };
 
-/// How the contact problem of a step is put and solved.
+/// Formulation and solver of the contact problem of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ContactLaw {
     /// Coulomb's cone, to rounding.

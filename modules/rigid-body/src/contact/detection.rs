@@ -32,7 +32,7 @@ struct Collider {
     /// Pose against the centre of mass in body axes, of the shape and of parry's.
     local: Isometry3<f64>,
     parry_local: Isometry3<f64>,
-    /// What the file says.
+    /// Shape as in the file.
     given: Shape,
     shape: SharedShape,
     /// Largest distance of the shape from the centre of mass, m.
@@ -51,7 +51,7 @@ pub(crate) struct ContactPoint {
     pub bodies: [Option<usize>; 2],
     /// Out of a into b: normal, tangent 1, tangent 2.
     pub frame: [V3; 3],
-    /// Where it is on a and on b, m in the world.
+    /// Positions of it on a and on b, m in the world.
     pub points: [V3; 2],
     /// Distance, negative where they overlap, m.
     pub gap: f64,
@@ -68,7 +68,7 @@ pub(crate) struct Detector {
     scratch: PairScratch,
 }
 
-/// What is filled anew for every pair.
+/// Buffers that are filled anew for every pair.
 #[derive(Default)]
 struct PairScratch {
     manifold: Manifold,
@@ -137,7 +137,7 @@ impl Detector {
         if a == b || neighbours(a, b) || neighbours(b, a) || filtered {
             return false;
         }
-        // What starts inside ground comes out of it.
+        // A body that starts inside ground comes out of it.
         if is_ground(&*self.colliders[i].shape) || is_ground(&*self.colliders[k].shape) {
             return true;
         }
@@ -255,7 +255,7 @@ fn between(
     for point in manifold.points.iter().filter(|p| p.dist < reach) {
         let on_a = (pose_a * Point3::from(vector(point.local_p1))).coords;
         let on_b = (pose_b * Point3::from(vector(point.local_p2))).coords;
-        // Where edges and corners coincide parry gives the same point more than once.
+        // At coinciding edges and corners parry gives the same point more than once.
         if out[first..].iter().any(|o| (o.points[0] - on_a).norm_squared() < SAME_POINT * SAME_POINT) {
             continue;
         }

@@ -7,8 +7,9 @@
 //! within the footprint; what would exceed a bound is put on it. A port that opens because it cannot both stick and
 //! press, and then has to close again, slips.
 //!
-//! Where the block of G in hand is far from singular, the proximal point is its only solution and comes from one
-//! factorisation of G itself; the active normals then come from a few guesses, and Lemke is left for what those miss.
+//! If the block of G in hand is far from singular, the proximal point is its only solution and comes from one
+//! factorisation of G itself; the active normals then come from a few guesses, and Lemke's algorithm solves those that
+//! the guesses miss.
 //!
 //! Wheels that rigid motors hold against each other cannot all keep their place: then the joint solution has no bound
 //! or its rounds no end. Sweeps over the ports (projected Gauss–Seidel) that stay within friction and footprint then
@@ -47,7 +48,7 @@ const MOST_CLOSINGS: u32 = 4;
 const SWEEPS: usize = 200;
 const SWEEP_CHANGE: f64 = 1e-9;
 
-/// What a component does at present.
+/// Present status of a component.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Status {
     /// No wrench: the port is open.
@@ -83,13 +84,13 @@ pub(crate) struct Estimator {
     solution: Vec<f64>,
     /// Motion left open by all components.
     open: Vec<f64>,
-    /// What slips in proportion to a normal force: component, which unknown, ratio.
+    /// Components that slip in proportion to a normal force: component, which unknown, ratio.
     slipping: Vec<(usize, usize, f64)>,
     /// Order of the rows of a factor.
     order: Vec<usize>,
     /// T before a round.
     before: Vec<f64>,
-    /// Where the rounds ended without a result.
+    /// State of the rounds when they ended without a result.
     rounds: Vec<f64>,
     /// Per port: how often it has closed since it opened first.
     closings: Vec<u32>,

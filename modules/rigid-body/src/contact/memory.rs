@@ -1,7 +1,7 @@
 //! Contact forces of the last step, from which the solution of the next one starts.
 //!
-//! Where contacts are redundant the solution is not unique, and the one next to the last is the one that does not
-//! make a resting stack tremble. It belongs to the state: a restored run goes on as it would have.
+//! If contacts are redundant the solution is not unique, and the one next to the last is the one that does not make a
+//! resting stack tremble. It belongs to the state: a restored run goes on as it would have.
 
 use crate::contact::detection::ContactPoint;
 use crate::math::V3;

@@ -34,7 +34,7 @@ impl PortJacobian {
         &self.matrices[level as usize]
     }
 
-    /// What was taken belongs to another step or other ports.
+    /// Discards results of another step or of other ports.
     pub fn forget(&mut self) {
         self.of = 0;
     }

@@ -63,8 +63,8 @@ impl Ports {
         }
     }
 
-    /// What of the arm of a port turns with the body: all of it, but a ball that carries no moments is touched below its
-    /// centre however it turns.
+    /// Part of the arm of a port that turns with the body: all of it, but a ball that carries no moments is touched
+    /// below its centre however it turns.
     fn carried(&self, port: &Port, motion: &Motion, arm: V3) -> V3 {
         let bare = port.mask & component::WRENCH & !component::FORCE == 0;
         let centre = self.balls.get(port.shape as usize).copied().flatten().filter(|_| bare);

@@ -10,8 +10,8 @@ const MOST: usize = 9;
 const SAME_PLANE: f64 = 0.999;
 /// Points of one plane nearer than this are one point, m.
 const SAME_POINT: f64 = 1e-5;
-/// How much higher an outermost point may lie per metre that it is further out. What is round touches near its deepest
-/// point and not at its rim.
+/// Height by which an outermost point may lie above the deepest one, per metre that it is further out. Round bodies
+/// touch near their deepest point and not at their rim.
 const SLOPE: f64 = 0.02;
 /// Half of the square root of 2.
 const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;

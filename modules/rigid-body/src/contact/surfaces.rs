@@ -18,7 +18,7 @@ const FRICTION: SurfaceParameter =
 const RESTITUTION: SurfaceParameter =
     ("restitution", 0.0, 1.0, "Newton's coefficient of restitution among bodies and with rigid ground");
 
-/// What holds where two bodies touch; none: what holds everywhere.
+/// Surface data of two bodies that touch; none: the general ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Pair {
     pub friction: Option<f64>,
@@ -64,7 +64,7 @@ impl Surfaces {
         Ok(Self { friction, restitution, pairs, bodies: model.bodies.len() })
     }
 
-    /// What the scenario says of two bodies; none: what stands still.
+    /// Surface data of two bodies from the scenario; none: a body that stands still.
     pub fn of(&self, bodies: [Option<usize>; 2]) -> Pair {
         let [a, b] = bodies.map(|b| b.unwrap_or(self.bodies));
         self.pairs.get(a * (self.bodies + 1) + b).copied().unwrap_or_default()

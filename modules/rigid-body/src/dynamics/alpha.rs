@@ -11,7 +11,7 @@ use crate::state::{Load, State};
 /// Time over which accelerations of the joints are differenced at the start, s.
 const START_DIFFERENCE_S: f64 = 1e-4;
 
-/// Where a body ends for the mean rate u, with its rates and accelerations there.
+/// End of a body for the mean rate u, with its rates and accelerations there.
 pub(super) fn end(weights: &Weights, start: &Motion, before: &Acceleration, u: &[f64], h: f64) -> BodyEnd {
     let (rate, acceleration) = weights.end(u, &rates(start), before, h);
     let turn = h * V3::new(u[3], u[4], u[5]);

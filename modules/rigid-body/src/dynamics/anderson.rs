@@ -13,7 +13,7 @@ const MEMORY: usize = 6;
 /// Added to the diagonal of the normal equations, as a share of it.
 const REGULARISATION: f64 = 1e-14;
 
-/// What the last corrections were.
+/// History of the last corrections.
 pub(crate) struct Anderson {
     /// Unknowns by which corrections are compared: the rates.
     rates: usize,

@@ -1,4 +1,4 @@
-//! Where bodies are at the end of a step of first order, and closing the joints there on the level of positions.
+//! Positions of bodies at the end of a step of first order, and closing the joints there on the level of positions.
 
 use super::{Dynamics, Failure};
 use crate::dynamics::joint_rows::gap;

@@ -55,7 +55,7 @@ pub(crate) fn mean_rows(joint: &Joint, starts: &[Motion], ends: &[Motion]) -> Ro
     Rows { directions, anchor: mean(&before.anchor, &after.anchor), lever: mean(&before.lever, &after.lever) }
 }
 
-/// Where the child stands against the parent, in the frame of the joint on the parent.
+/// Pose of the child relative to the parent, in the frame of the joint on the parent.
 pub(crate) struct Stand {
     /// From the parent's anchor to the child's, m.
     apart: V3,
@@ -75,7 +75,7 @@ impl Stand {
         }
     }
 
-    /// How far the joint is out of place, in the rows' order, m and rad; rows that do not hold are 0.
+    /// Position error of the joint, in the rows' order, m and rad; rows that do not hold are 0.
     pub fn gap(&self, joint: &Joint) -> [f64; 6] {
         let Self { apart, turn } = self;
         let turned = if joint.kind == Kind::Universal {

@@ -6,7 +6,7 @@ use crate::math::{M3, Q};
 use crate::model::{Body, Model};
 use terraglue_linear_solver::{Cut, Error, Link, Rows, Tree};
 
-/// Where the unknowns of bodies (six rates) and joints (six impulses) stand, and the solver.
+/// Positions of the unknowns of bodies (six rates) and joints (six impulses) in the system, and the solver.
 pub(crate) struct Kkt {
     pub solver: Tree,
     pub body_at: Vec<usize>,

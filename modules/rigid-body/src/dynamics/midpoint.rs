@@ -13,7 +13,7 @@ use crate::model::Body;
 use crate::motion::Motion;
 use crate::state::Load;
 
-/// Where a body ends for the mean rate u, with its rates and mean acceleration.
+/// End of a body for the mean rate u, with its rates and mean acceleration.
 pub(super) fn end(start: &Motion, u: &[f64], h: f64) -> BodyEnd {
     let (way, rate) = (V3::from_row_slice(&u[..3]), V3::from_row_slice(&u[3..6]));
     let turn = h * rate;

@@ -125,7 +125,7 @@ impl Dynamics {
     pub fn new(model: Model, integrator: Integrator, bodies: &[Motion]) -> Result<Self, SolverError> {
         let kkt = Kkt::new(&model)?;
         let (nb, nj, n) = (model.bodies.len(), model.joints.len(), kkt.len());
-        // What slides changes its lever beyond any turn, and rows of universal joints turn faster than their bodies.
+        // Sliding changes the lever beyond any turn, and rows of universal joints turn faster than their bodies.
         let arm = |j: &Joint| match j.kind {
             Kind::Fixed | Kind::Revolute | Kind::Spherical => {
                 j.child_anchor.norm().max(j.parent_anchor.norm())
@@ -255,7 +255,7 @@ impl Dynamics {
         Some(AxisResult { rate, end_rate: rate, mean_rate, impulse })
     }
 
-    /// What decides on the branch of an axis: the change of its coordinate over h, and its impulse.
+    /// State that decides on the branch of an axis: the change of its coordinate over h, and its impulse.
     fn axis_state(&self, j: usize) -> Option<(f64, f64)> {
         let joint = &self.model.joints[j];
         let free = self.branches.free(j, joint)?;

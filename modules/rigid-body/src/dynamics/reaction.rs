@@ -1,11 +1,11 @@
-//! What a joint of the tree carries: the multipliers of its rows, the motor's share included, as force and moment.
+//! Reactions of the joints of the tree: the multipliers of their rows, the motor's share included, as force and moment.
 
 use super::scheme::Integrator;
 use super::{Dynamics, joint_rows};
 use crate::math::V3;
 
 impl Dynamics {
-    /// What the commit asks for beyond a trial: rates at the end of the step, impulses of rigid rows.
+    /// Results that the commit needs beyond a trial: rates at the end of the step, impulses of rigid rows.
     pub fn complete(&mut self) {
         if !self.integrator.is_second_order() {
             (0..self.trial.ends.len()).for_each(|b| self.find_rates(b));

@@ -1,4 +1,4 @@
-//! How positions, rates and accelerations of a step hang together.
+//! Relations of the positions, rates and accelerations of a step.
 //!
 //! The unknown is always the mean rate u = (x⁺ − x)/h of a body. Semi-implicit Euler: u is the rate at the end and
 //! M(u − v) = h·f. Generalized-α (Chung and Hulbert 1993; on Lie groups with index-3 constraints: Arnold and Brüls
@@ -68,7 +68,7 @@ pub(crate) struct Weights {
     gamma: f64,
 }
 
-/// What generalized-α remembers of a body.
+/// State of a body in generalized-α.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Acceleration {
     /// a: the algorithmic one, which lags by (α_m − α_f)·h.
@@ -109,7 +109,7 @@ impl Weights {
     }
 }
 
-/// Where a body ends.
+/// State of a body at the end of a step.
 pub(super) struct BodyEnd {
     pub motion: Motion,
     /// Rotation vector of the step before the Cayley transform.

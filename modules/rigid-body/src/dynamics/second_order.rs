@@ -1,4 +1,4 @@
-//! What the second-order options share: Newton on equilibrium and joints for the mean rates of the step.
+//! Common parts of the second-order options: Newton on equilibrium and joints for the mean rates of the step.
 //!
 //! The matrix is the factor of the step, M and the rows J taken at the predicted motion; residuals are exact, so what
 //! the matrix leaves out (gyroscopic terms, turning of the rows under load) costs iterations, not accuracy. Joints
@@ -13,8 +13,8 @@ use crate::state::State;
 const MAX_CORRECTIONS: usize = 60;
 /// After so many corrections, or when they grow, earlier ones help (see [`super::anderson`]).
 const PLAIN: usize = 8;
-/// Where corrections shrink no more, so much of the largest rate is rounding: next to a singular pose gaps tell rates
-/// badly.
+/// Share of the largest rate that is rounding once corrections shrink no more: next to a singular pose gaps determine
+/// rates badly.
 const STALLED: f64 = 1e-7;
 /// Corrections end when the rates change by less than this, relative to the largest.
 const RATE_CHANGE: f64 = 1e-11;
@@ -185,7 +185,7 @@ fn noise(dynamics: &Dynamics) -> f64 {
     ROUNDING * far / dynamics.h + REST
 }
 
-/// What is missing to the equilibrium of body b at the end of the trial.
+/// Residual of the equilibrium of body b at the end of the trial.
 fn equilibrium(dynamics: &Dynamics, b: usize) -> Six {
     let (body, gravity, load) =
         (&dynamics.model.bodies[b], &dynamics.model.gravity, &dynamics.start.loads[b]);

@@ -1,4 +1,4 @@
-//! How the end of a trial answers to a wrench, exactly: what the factor of the step alone leaves out.
+//! Exact derivative of the end of a trial by a wrench, with the parts that the factor of the step alone leaves out.
 //!
 //! The factor P holds the rows of the joints where the step was linearised: at its start, its predicted end, or their
 //! mean. The derivative of a trial asks for the rows of the conditions where the bodies ended, under the derivative of
@@ -9,7 +9,8 @@
 
 use super::Dynamics;
 
-/// How far the differences move a body, m or rad: their error is about that share, over the length of a body.
+/// Distance or angle by which the differences move a body, m or rad: their error is about that share, over the length
+/// of a body.
 const MOVE: f64 = 1e-6;
 /// Share of y that may be left out.
 const EXACT: f64 = 1e-6;
@@ -116,7 +117,7 @@ fn find_ends(dynamics: &mut Dynamics) {
     }
 }
 
-/// What is missing to the conditions of the step, into `correction`.
+/// Residual of the conditions of the step, into `correction`.
 fn find_residual(dynamics: &mut Dynamics) {
     if dynamics.integrator.is_second_order() {
         dynamics.residual_second_order();

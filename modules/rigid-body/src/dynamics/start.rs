@@ -1,4 +1,4 @@
-//! What a step begins with: the motion at its start, and how bodies would go on without impulses.
+//! Start of a step: the motion there, and the motion of the bodies without impulses.
 
 use super::gyro;
 use super::scheme::Acceleration;

@@ -7,7 +7,7 @@ use crate::math::{Q, V3, cayley};
 use crate::model::Body;
 use crate::motion::Motion;
 
-/// What a trial has found.
+/// Results of a trial.
 pub(crate) struct Trial {
     /// Rates and (negative) impulses.
     pub solution: Vec<f64>,

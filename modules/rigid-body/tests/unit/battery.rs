@@ -18,7 +18,7 @@ fn voltage_sags_by_the_closed_form_and_charge_is_counted() {
     let current = (u0 - (u0 * u0 - 4.0 * 0.5 * 100.0_f64).sqrt()) / (2.0 * 0.5);
     assert!((b.current - current).abs() < 1e-12 && (b.voltage - (u0 - 0.5 * current)).abs() < 1e-12);
     assert!((1.0 - b.charge - current * 1e-3 / 3600.0).abs() < 1e-15);
-    // What the chemistry gives is what arrives plus what the resistance loses.
+    // Energy of the chemistry is the delivered one plus the loss in the resistance.
     assert!((u0 * current * 1e-3 - b.delivered - b.lost).abs() < 1e-12);
 }
 

@@ -122,7 +122,7 @@ impl Automaton {
         self.settings.angle_of_repose.unwrap_or(self.friction_angle)
     }
 
-    /// What was done.
+    /// Counts of the work done.
     pub fn counts(&self) -> &Counts {
         &self.sweeper.counts
     }

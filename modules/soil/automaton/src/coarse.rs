@@ -12,7 +12,7 @@ use terraglue_ground::{Lattice, UNIT_M};
 use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Result, Terrain, TerrainTile};
 
-/// How much steeper slopes may stay on the coarse lattice.
+/// Factor by which slopes may be steeper on the coarse lattice.
 const STEEPER: f32 = 1.05;
 /// A ground is at rest when a sweep changes no node by more, units (1 µm).
 const AT_REST: i32 = 4;

@@ -2,7 +2,7 @@
 
 use terraglue_ground::{Lattice, TileMap, TileMapSnapshot, UNIT_M};
 
-/// What a node holds is kept in grains of so many units of height (7.6 µm): 16 bits reach to 0.5 m.
+/// Content of a node is kept in grains of so many units of height (7.6 µm): 16 bits reach to 0.5 m.
 const GRAIN: i32 = 32;
 /// Tiles that can be touched before memory is asked for again.
 const RESERVE_TILES: usize = 256;
@@ -12,7 +12,7 @@ const RESERVE_TILES: usize = 256;
 pub struct Compaction {
     fraction: f64,
     grains: TileMap<u16>,
-    /// What whole units have left over of the fraction so far, units.
+    /// Remainder of the fraction beyond whole units so far, units.
     carried: f64,
     /// Units that make no whole grain yet; the node at which they do gets it.
     unplaced: i32,

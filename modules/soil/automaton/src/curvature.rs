@@ -19,8 +19,8 @@ pub fn limits(curvature_max: f64, critical: i32, spacing: f64) -> Option<[i32; 2
     (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32])
 }
 
-/// What the middles of the triples (a, middle, b) receive from each end, units, at `first` …; < 0: they give.
-/// Returns whether any is not 0. `shift` moves a to the left and b to the right.
+/// Units that the middles of the triples (a, middle, b) receive from each end, at `first` …; < 0: they give. Returns
+/// whether any is not 0. `shift` moves a to the left and b to the right.
 #[inline(always)]
 pub fn triples(
     [a, middle, b]: [&[i32]; 3],

@@ -21,7 +21,7 @@ const DIRECTIONS: [([i32; 2], i32); 8] = [
 /// A node without a foot, and its weight among the eight.
 type Place = ([i32; 2], f64);
 
-/// What displacement changes.
+/// Data that displacement changes.
 pub struct Site<'a> {
     /// Ground.
     pub ground: &'a mut Ground,
@@ -87,7 +87,8 @@ impl Site<'_> {
         loose - left
     }
 
-    /// How many units can go from a node to its places until the sum of the squares of the heights has grown by the most.
+    /// Number of units that can go from a node to its places until the sum of the squares of the heights has grown by
+    /// the most.
     fn liftable(&self, [i, j]: [i32; 2], places: &[Option<Place>; 8], sum: f64) -> i32 {
         let heights = &self.ground.heights;
         let (mut higher, mut spread) = (0.0, 1.0);

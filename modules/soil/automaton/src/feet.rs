@@ -25,7 +25,7 @@ pub struct Foot {
     pub node: [i32; 2],
     /// Force-equivalent height, units.
     pub load: i32,
-    /// What still fits below the foot's underside, units; 0: the foot stands here.
+    /// Room below the foot's underside, units; 0: the foot stands here.
     pub room: i32,
 }
 
@@ -45,7 +45,7 @@ impl Foot {
         self.key().cmp(&other.key()).then_with(same_node)
     }
 
-    /// What the rules see of it.
+    /// Values of it that the rules see.
     fn seen(&self) -> (i32, i32) {
         (self.load, inlet(self.room))
     }
@@ -61,7 +61,7 @@ fn load_units(node: &Covered) -> i32 {
     (height / (UNIT_M * f64::from(QUANTUM)) + 0.5) as i32 * QUANTUM
 }
 
-/// What fits between the ground and a foot that does not touch it, units; 0: the foot stands here and the node is closed.
+/// Room between the ground and a foot that does not touch it, units; 0: the foot stands here and the node is closed.
 fn room_units(node: &Covered, height: f64) -> i32 {
     const LARGEST: f64 = 65_536.0;
     if node.pressure > 0.0 { 0 } else { ((node.lower - height) / UNIT_M).clamp(1.0, LARGEST) as i32 }
@@ -170,7 +170,7 @@ const RUNS: usize = 64;
 #[derive(Clone, Debug)]
 struct Runs {
     merged: Vec<Foot>,
-    /// Where each run ends.
+    /// End of each run.
     ends: Vec<usize>,
 }
 

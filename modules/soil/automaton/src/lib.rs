@@ -54,7 +54,7 @@ pub use sweep::{Counts, Sweeper};
 
 use terraglue_subsystem::{Parameter, ParameterType};
 
-/// What a soil takes from its scenario table for these rules; `compacted` is its default for `compacted_fraction`.
+/// Parameters of these rules in the scenario table of a soil; `compacted` is its default for `compacted_fraction`.
 pub fn schema(compacted: f64) -> Vec<Parameter> {
     vec![
         Parameter::number(

@@ -4,21 +4,21 @@
 //! a face may lie between two nodes or be spread over several, so the height that counts is that of the run: of all faces one
 //! behind the other along a row or a column that are steeper than the angle of repose and fall to the same side.
 //!
-//! What lies loose has c' = ⅔·c and tan φ' = ⅔·tan φ (Terzaghi 1943, art. 46) once it has come to rest, and stands on runs up to the
-//! height H_c' of these; on higher ones, and while it moves, it slides down to the angle of repose.
+//! Loose soil has c' = ⅔·c and tan φ' = ⅔·tan φ (Terzaghi 1943, art. 46) once it has come to rest, and stands on runs
+//! up to the height H_c' of these; on higher ones, and while it moves, it slides down to the angle of repose.
 
 use crate::span::Span;
 use terraglue_soil_contact::Ground;
 
-/// What may flow over a face.
+/// Soil that may flow over a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Face {
     /// Everything.
     #[default]
     Falls,
-    /// What lies loose; cohesion holds the rest.
+    /// Loose soil; cohesion holds the rest.
     Sheds,
-    /// What is moving: loose soil at rest has cohesion, too.
+    /// Moving soil: loose soil at rest has cohesion, too.
     Stands,
     /// Nothing: a node beside it is not visited.
     Waits,
@@ -41,7 +41,7 @@ pub fn hold(flux: &mut [i32], faces: &[Face], free: impl Fn(usize, Face) -> [i32
     }
 }
 
-/// How far a run is followed outside a window, nodes.
+/// Largest distance for which a run is followed outside a window, nodes.
 const FARTHEST: i32 = 4096;
 
 /// Levels of a window and the part that lies on the lattice.
@@ -62,7 +62,7 @@ pub struct Field<'a> {
     pub left: usize,
     /// Smallest Δ·tan φ_r, units.
     pub least: f32,
-    /// What each node admits, row after row; 0: it is closed. Empty: all are open.
+    /// Units that each node admits, row after row; 0: it is closed. Empty: all are open.
     pub inlets: &'a [i32],
 }
 
@@ -74,8 +74,8 @@ pub struct Standing {
     across: Vec<Face>,
     /// Nodes beside those that are visited which a run that falls reaches, per row.
     pub wake: Vec<Span>,
-    /// How much the run that touches the border falls outside, units, positive towards larger indices: at the left and right of
-    /// every row, below and above every column.
+    /// Fall of the run that touches the border outside the window, units, positive towards larger indices: at the left
+    /// and right of every row, below and above every column.
     beyond: [Vec<i32>; 4],
 }
 

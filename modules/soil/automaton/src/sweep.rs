@@ -18,7 +18,7 @@ const PARALLEL_NODES: i64 = 4096;
 /// Edge of the blocks in which the ground is looked through, in tiles.
 const BLOCK_TILES: u32 = 4;
 
-/// What the last step did, and sums since the start.
+/// Counts of the last step, and sums since the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counts {
     /// Visits of nodes in the last step.
@@ -58,7 +58,7 @@ pub struct Sweeper {
     pub repose: Marks,
     /// Active nodes for the rule of curvature.
     pub curvature: Marks,
-    /// What was done.
+    /// Counts of the work done.
     pub counts: Counts,
     limits: Limits,
     /// Δ·tan φ_r by the number of the mask; empty: one holds everywhere.
@@ -118,8 +118,8 @@ impl pulp::NullaryFnOnce for Look<'_> {
     }
 }
 
-/// How far beyond the active nodes sweeps wake others: a change wakes nodes one away for repose and two away for
-/// curvature, which acts in every second sweep.
+/// Distance beyond the active nodes at which sweeps wake others: a change wakes nodes one away for repose and two away
+/// for curvature, which acts in every second sweep.
 fn reach(sweeps: u32, parity: u32) -> usize {
     let (mut repose, mut curvature) = (0, 0);
     for k in 0..sweeps {

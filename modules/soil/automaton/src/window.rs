@@ -85,13 +85,13 @@ pub struct Window {
     rows: Option<Span>,
     /// Sides where the lattice ends inside the window: left, right, lower, upper.
     borders: [bool; 4],
-    /// What the rules have to visit, per row.
+    /// Spans that the rules have to visit, per row.
     pub repose: Vec<Span>,
     /// See `repose`.
     pub curvature: Vec<Span>,
     next: Vec<Span>,
     dirty: Vec<Span>,
-    /// What the last pass has changed, per row.
+    /// Spans that the last pass has changed, per row.
     changed: Vec<Span>,
     /// Rows of fluxes and changes.
     work: Vec<Vec<i32>>,

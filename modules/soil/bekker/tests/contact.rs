@@ -1,4 +1,4 @@
-//! What every soil must hold: rest, plates, stick, shear, derivatives, states, energy.
+//! Properties of every soil: rest, plates, stick, shear, derivatives, states, energy.
 
 #[path = "../../contact/tests/support/bars.rs"]
 mod bars;

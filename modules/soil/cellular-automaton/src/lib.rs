@@ -2,7 +2,7 @@
 //!
 //! The module `soil-cellular-automaton`: the paper's automaton under the laws of pressure and shear that all soils share.
 //!
-//! Where the material goes is told in `terraglue-soil-material`, what a foot feels in `terraglue-soil-contact`.
+//! `terraglue-soil-material` moves the material, `terraglue-soil-contact` computes the force on a foot.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

@@ -37,7 +37,7 @@ fn turned(w: [f64; 3], q: [f64; 4]) -> [f64; 4] {
     compose(&of([libm::cos(0.5 * angle), x, y, z]), &of(q)).orientation
 }
 
-/// How far the lowest point of a body lies below its middle, m.
+/// Distance of the lowest point of a body below its middle, m.
 fn low(kind: u32, orientation: [f64; 4]) -> f64 {
     let body = Placed::new(&shape(kind), &Pose { position: [0.0; 3], orientation });
     -body.patch_origin([0.0, 0.0, 1.0])[2].min(0.0)
@@ -146,8 +146,8 @@ fn dragged(kind: u32, step_mm: f64) -> [f64; 2] {
     sums
 }
 
-/// What is pressed out comes to its neighbours a few units of height at a time where steps are short: it is as loose as what
-/// comes at once. (It was firm: the force on a sphere grew by half from steps of 0.2 mm to such of 0.0125 mm.)
+/// Soil that is pressed out comes to its neighbours a few units of height at a time if steps are short: it is as loose
+/// as soil that comes at once.
 #[test]
 fn forces_converge_in_shorter_steps() {
     for kind in [0, 2, 3] {

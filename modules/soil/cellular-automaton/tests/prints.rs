@@ -90,8 +90,8 @@ fn walls_of_lunar_prints_are_steep() {
     }
 }
 
-/// What a foot presses out has no cohesion as long as it moves: it slides away from the foot and does not stand around it as a wall
-/// as thin as a cell. 65 % of 80 cm³ around 26 cm are at most 16.7 mm high as a wedge of 35° that leans on the foot.
+/// Soil that a foot presses out has no cohesion as long as it moves: it slides away from the foot and does not stand
+/// around it as a wall as thin as a cell.
 #[test]
 fn the_heap_around_a_foot_is_no_wall() {
     for spacing in [0.01, 0.005] {

@@ -65,7 +65,7 @@ fn heaps() -> impl Strategy<Value = Heaps> {
     )
 }
 
-/// How `parallel_for` does its work.
+/// Order of the work of `parallel_for`.
 #[derive(Clone, Copy, Debug)]
 enum Order {
     Forward,

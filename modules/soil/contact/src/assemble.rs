@@ -8,8 +8,8 @@ use crate::wall;
 use terraglue_soil_law::ShearResponse;
 use terraglue_subsystem::Result;
 
-/// What the laws answered at the nodes of the patches in one motion of their feet, for the stiffness there: it needs no
-/// second look at the laws.
+/// Answers of the laws at the nodes of the patches in one motion of their feet, for the stiffness there without a
+/// second evaluation of the laws.
 #[derive(Clone, Debug, Default)]
 pub struct Noted {
     /// Node, slope of its pressure (Pa/m), answer of its shear law; patch after patch.
@@ -91,7 +91,7 @@ impl Patches {
         }
     }
 
-    /// What the soil beside patch `p` answers when its foot has moved by `x`.
+    /// Answer of the soil beside patch `p` when its foot has moved by `x`.
     pub fn beside(&self, p: usize, x: &[f64; 6]) -> wall::WallAnswer {
         let wall = &self.ports[p].wall;
         wall.answer(&self.sides, wall.way_of(x))

@@ -60,7 +60,7 @@ impl EnergyLedger {
     }
 }
 
-/// What happens to the energy under one foot in one commit, J.
+/// Turnover of energy under one foot in one commit, J.
 #[derive(Clone, Copy, Debug, Default)]
 struct Turnover {
     /// Work on the soil.
@@ -124,7 +124,7 @@ struct Pressed<'a> {
     kept: &'a KeptContact,
 }
 
-/// What a law with a state answers for a node beside the pressure.
+/// Answer of a law with a state for a node, beside the pressure.
 #[derive(Default)]
 struct KeptContact {
     permanent: f64,
@@ -525,13 +525,13 @@ fn covered(n: &PatchNodes, k: usize, [depth, pressure]: [f64; 2], n_z: f64) -> (
     (Covered { i, j, lower, depth: deep.max(0.0), pressure, virgin, surface, flow }, deep)
 }
 
-/// How much deeper than it counts node k lies, m.
+/// Depth of node k beyond the depth that counts, m.
 fn relief(nodes: &PatchNodes, k: usize) -> f64 {
     let relief = nodes.relief[k];
     if relief.is_nan() { 0.0 } else { relief }
 }
 
-/// Where soil that is pressed out flows under an underside that moves by `moved`, see [`Covered::flow`].
+/// Direction in which soil that is pressed out flows under an underside that moves by `moved`, see [`Covered::flow`].
 fn flow_along(port: &Port, moved: [f64; 3]) -> [f64; 2] {
     let length = dot(moved, moved).sqrt();
     in_world(port, moved).map(|c| if length > 0.0 { c / length } else { 0.0 })

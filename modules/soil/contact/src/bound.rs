@@ -1,4 +1,4 @@
-//! What nodes bear along the ground at most, asked of an expression or a module for many nodes at once.
+//! Largest shear stress at nodes, from an expression or a module for many nodes at once.
 
 use crate::patch::Local;
 use terraglue_soil_law::YieldNodes;

@@ -34,26 +34,26 @@ impl Plane {
         Self { height, slope: self.slope }
     }
 
-    /// How far its slope is meant.
+    /// Weight of its slope.
     fn weight(&self) -> f64 {
         let [a, b] = self.slope;
         ((STEEPEST_SLOPE - (a * a + b * b).sqrt()) / (STEEPEST_SLOPE - STEEP)).clamp(0.0, 1.0)
     }
 }
 
-/// What is known of the underside at a neighbour.
+/// Underside at a neighbour.
 struct Side {
     /// Its plane as seen from the node.
     plane: Plane,
-    /// How far the slopes of both are meant.
+    /// Weight of the slopes of both.
     weight: f64,
     edge: Option<Edge>,
 }
 
-/// Where the plane of a neighbour meets that of the node within its cell.
+/// Intersection of the plane of a neighbour with that of the node within its cell.
 struct Edge {
     plane: Plane,
-    /// How far from the border of the cell towards its node, 0 … 1.
+    /// Distance from the border of the cell towards its node, 0 … 1.
     depth: f64,
 }
 

@@ -12,7 +12,7 @@ const CHUNK: usize = 64;
 /// Nodes of a patch in one place of its foot.
 pub struct Chunk {
     count: usize,
-    /// How many of them, at the front, are under pressure.
+    /// Number of them, at the front, that are under pressure.
     pressed: usize,
     node: [usize; CHUNK],
     depth: [f64; CHUNK],

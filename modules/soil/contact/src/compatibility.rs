@@ -27,7 +27,7 @@ pub struct Compatibility {
     residual: Vec<f64>,
     d: Vec<f64>,
     base: Vec<f64>,
-    /// What the laws answered at `x`.
+    /// Answers of the laws at `x`.
     noted: Noted,
     /// [I + K·G | −r], column-major n × (n + 1).
     matrix: Vec<f64>,

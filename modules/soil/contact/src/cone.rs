@@ -35,7 +35,7 @@ impl Remembered for Carried {
     }
 }
 
-/// What of a soil its cones are made of.
+/// Parameters of a soil for its cones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ConeMaterial {
     /// Mass of the cone per volume, the part that is counted times the density, kg/m³; 0: soil has no inertia.
@@ -59,7 +59,7 @@ pub struct Cone {
     h: f64,
 }
 
-/// What a cone answers.
+/// Answer of a cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ConeAnswer {
     /// Force on the foot along n, N; < 0 where the cone is slowed down.
@@ -115,7 +115,7 @@ impl Cone {
         if grows { [mass, 3.0 * full * rest * rest / height] } else { [mass.max(self.before.mass), 0.0] }
     }
 
-    /// What it answers when the foot has moved by `x`.
+    /// Its answer when the foot has moved by `x`.
     pub fn answer(&self, x: &[f64; 6]) -> ConeAnswer {
         let up = self.up(x);
         let momentum = self.before.mass * self.before.speed;

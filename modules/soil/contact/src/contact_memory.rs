@@ -1,6 +1,6 @@
-//! What contacts remember from commit to commit, by the keys of their ports: lists in ascending order of the keys.
+//! Memory of contacts from commit to commit, by the keys of their ports: lists in ascending order of the keys.
 
-/// What one contact remembers.
+/// Memory of one contact.
 pub trait Remembered: Copy {
     /// Of a contact that was never seen.
     fn new(key: u64) -> Self;
@@ -20,7 +20,7 @@ pub fn remember<T: Remembered>(all: &mut Vec<T>, new: T) {
     }
 }
 
-/// What the contact `key` remembers.
+/// Memory of the contact `key`.
 pub fn recall<T: Remembered>(all: &[T], key: u64) -> T {
     all.binary_search_by_key(&key, T::key).map_or_else(|_| T::new(key), |k| all[k])
 }

@@ -1,4 +1,4 @@
-//! What is told of each wheel and foot: numbers of the last commit, one set per contact.
+//! Variables of wheels and feet: numbers of the last commit, one set per contact.
 
 use crate::patch_nodes::PatchNodes;
 use crate::wheel::Wheel;
@@ -84,7 +84,7 @@ impl Contacts {
 /// A wheel whose rim and axle are slower stands, m/s: soil under load creeps on the last nanometres of its balance.
 const STANDS: f64 = 1e-4;
 
-/// What a commit has found below a contact.
+/// Result of a commit below a contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Touch {
     /// Sum of the areas with pressure, m².

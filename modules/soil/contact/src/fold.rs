@@ -5,7 +5,7 @@ use crate::patch_nodes::Plane;
 /// Points along each side of a cell at which an underside with an edge is looked at.
 const SAMPLES: usize = 4;
 const POINTS: usize = SAMPLES * SAMPLES;
-/// How far the outermost of them lie from the node, in cells.
+/// Distance of the outermost of them from the node, in cells.
 const OUTERMOST: f64 = 0.5 - 0.5 / SAMPLES as f64;
 /// The standard deviation of evenly spaced mid-points is smaller than that of what they stand for.
 const MIDPOINTS: f64 = 1.032_795_558_988_644;
@@ -14,7 +14,7 @@ const OUTSIDE: f64 = 1e-3;
 /// The plane of the node and those of its eight neighbours.
 const FACES: usize = 9;
 
-/// What the underside is like in a cell, relative to its node; heights vertical.
+/// Shape of the underside in a cell, relative to its node; heights vertical.
 pub struct Underside {
     /// Mean height above the node, m.
     pub rise: f64,
@@ -110,7 +110,7 @@ impl Fold {
     }
 }
 
-/// What a face of an underside adds at each point.
+/// Contribution of a face of an underside at each point.
 #[derive(Clone, Copy, Default)]
 struct Face {
     slope: [f64; 2],

@@ -39,19 +39,19 @@ pub struct Covered {
 pub struct Ground {
     /// Heights of the material.
     pub heights: HeightField,
-    /// What the soil remembers.
+    /// Memory of the soil at its nodes.
     pub nodes: NodeStates,
     /// Wheels that have touched it.
     pub wheels: Vec<Memory>,
-    /// How far contacts have pushed the soil beside them.
+    /// Displacement of the soil beside contacts.
     pub pushes: Vec<Push>,
     /// Soil that moves with contacts.
     pub cones: Vec<Carried>,
-    /// What is told of the contacts.
+    /// Results of the contacts.
     pub contacts: Contacts,
     /// Which soil lies where.
     pub mask: Mask,
-    /// What a law keeps per node.
+    /// State of the law per node.
     pub law_memory: LawMemory,
 }
 

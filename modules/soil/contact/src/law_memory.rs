@@ -1,5 +1,5 @@
-//! What a law with a state keeps per node: some doubles, owned by the soil, so that saving and going back need no code of
-//! the law. They stay with the soil when a foot leaves.
+//! State of a law per node: some doubles, owned by the soil, so that saving and going back need no code of the law.
+//! They stay with the soil when a foot leaves.
 
 use terraglue_ground::{Lattice, TileMap, TileMapSnapshot};
 

@@ -1,4 +1,5 @@
-//! What all soils on a height field share: contact patches, node states, fields, variables; a soil adds where material goes.
+//! Common parts of all soils on a height field: contact patches, node states, fields, variables; a soil adds the motion
+//! of material.
 //!
 //! A soil module brings a [`Material`], which says where the soil under a foot goes; [`FieldSoil`] makes a
 //! subsystem of it. The pressure and shear laws act node by node on floating-point depths; the fixed-point

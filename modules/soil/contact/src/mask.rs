@@ -12,7 +12,7 @@ use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 /// Soils beside the scenario's own at most.
 pub const MOST_SOILS: usize = 62;
 
-/// What a soil on a field takes from its scenario table: the laws' numbers and the mask.
+/// Parameters of a soil on a field in its scenario table: the laws' numbers and the mask.
 pub fn schema() -> Vec<Parameter> {
     let mut parameters = SoilParameters::schema();
     let of = |name, kind, help| Parameter::of(name, kind, help).optional();

@@ -1,4 +1,4 @@
-//! What the soil remembers at its nodes: everything where a foot stands, one number where one has stood.
+//! Memory of the soil at its nodes: everything under a foot, one number at places where a foot has stood.
 //!
 //! Ground that was pressed outnumbers ground that is being pressed by far, so only the depth that stays is kept for
 //! every node; the history of a contact lives in a list as long as the contact does.
@@ -14,7 +14,7 @@ const RESERVE_NODES: usize = 4096;
 const RESERVE_INDEX: usize = 64;
 const ABSENT: u32 = u32::MAX;
 
-/// What the soil remembers at a node. The default is untouched ground.
+/// Memory of the soil at a node. The default is untouched ground.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct NodeState {
     /// Reference level while a foot stands here, m, not rounded; see [`crate::Ground::reference`].
@@ -53,16 +53,17 @@ impl NodeState {
         self.stamp != 0
     }
 
-    /// What is left of the loose soil, m: all that the foot has not pressed through.
+    /// Remainder of the loose soil, m: all that the foot has not pressed through.
     pub fn loose_left(&self) -> f64 {
         (self.bed - self.permanent).clamp(0.0, self.loose)
     }
 }
 
-/// What is kept of a node that no foot stands on, in 80 bits: the permanent depth of the bed in sixteenths of a unit of
-/// height (26 bits, to 1 m), the remainder of the surface in 1/16384 of a unit (14 bits), the height of the loose soil on
-/// the bed in units (24 bits, to 4 m), exactly: it comes a few units at a time where steps are short, and half the range of depths of
-/// the print in sixteen units (16 bits, to 25 cm). A foot that comes back finds its pressure to 1e-6 from a depth of a centimetre on.
+/// Memory of a node that no foot stands on, in 80 bits: the permanent depth of the bed in sixteenths of a unit of
+/// height (26 bits, to 1 m), the remainder of the surface in 1/16384 of a unit (14 bits), the height of the loose soil
+/// on the bed in units (24 bits, to 4 m), exactly: it comes a few units at a time if steps are short, and half the
+/// range of depths of the print in sixteen units (16 bits, to 25 cm). A foot that comes back finds its pressure to 1e-6
+/// from a depth of a centimetre on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 struct Kept {
     bed: [u8; 5],

@@ -1,4 +1,4 @@
-//! What a soil shows of what stands on it: the pressure at every node, and the friction cone of every contact.
+//! Overlays of a soil at its contacts: the pressure at every node, and the friction cone of every contact.
 //!
 //! Both follow from the committed nodes alone. Nodes that lie beside each other, also across a corner, are one contact; its
 //! normal is that of the plane through the reference levels of its nodes by least squares.

@@ -36,7 +36,7 @@ pub struct Patch {
     pub strength: f64,
     /// Start for the inverse of the normal law: the last solution in this step.
     pub warm: f64,
-    /// What rolls here.
+    /// The wheel that rolls here.
     pub wheel: Option<Wheel>,
     /// Largest friction of the soils here.
     pub friction: f64,
@@ -63,7 +63,7 @@ pub struct Local {
     pub passive: [f64; 2],
     /// c·cot φ of the soil itself, Pa.
     pub cohesive: f64,
-    /// What an inclined load leaves of its capacity.
+    /// Effect of an inclined load on the bearing capacity.
     pub inclination: Inclination,
     /// Modulus of loose soil over that of the bed.
     pub loose: f64,
@@ -103,15 +103,15 @@ pub struct Laws {
     pub elastic: f64,
     /// Tension up to which soil clings, Pa.
     pub adhesion: f64,
-    /// What concerns wheels alone.
+    /// Parameters of wheels alone.
     pub rolling: Rolling,
-    /// How the direction of motion and the slope of the underside enter.
+    /// Effect of the direction of motion and of the slope of the underside.
     pub direction: Direction,
     /// a and b of the passive stress a + b·z, Pa and Pa/m.
     pub passive: [f64; 2],
     /// c·cot φ of the soil itself, Pa.
     pub cohesive: f64,
-    /// What an inclined load leaves of its capacity.
+    /// Effect of an inclined load on the bearing capacity.
     pub inclination: Inclination,
     /// The soil that moves with a foot.
     pub cone: cone::ConeMaterial,
@@ -249,8 +249,8 @@ impl Patches {
         })
     }
 
-    /// What the nodes in `range` bear of the pressure of first loading, and beside it: less on inclined faces, less under
-    /// shear, more on faces that are pushed sideways.
+    /// Bearing capacity of the nodes in `range` relative to the pressure of first loading, and beside it: less on
+    /// inclined faces, less under shear, more on faces that are pushed sideways.
     fn bear(&mut self, direction: &Direction, wall: &Wall, b: f64, range: std::ops::Range<usize>) {
         let inclination = direction.load_inclination.then(|| self.inclination(range.clone())).flatten();
         for k in range {
@@ -409,7 +409,7 @@ impl Patches {
         Ok(())
     }
 
-    /// Where two ports cover a node, the deeper one presses; the other one's area there becomes 0.
+    /// If two ports cover a node, the deeper one presses; the other one's area there becomes 0.
     fn share_nodes(&mut self, step: &Step) {
         for b in 1..self.ports.len() {
             for a in 0..b {

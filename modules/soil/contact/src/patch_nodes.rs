@@ -5,7 +5,7 @@ use crate::vectors::{displacement, dot};
 use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Port;
 
-/// How the underside faces the soil at a node; vectors along n, t1, t2.
+/// Orientation of the underside at a node; vectors along n, t1, t2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facing {
     /// ν·n_z/ν_z with the body's inward normal ν: pressure·area acts along it on the body, and a displacement d of
@@ -70,7 +70,7 @@ pub struct PatchNodes {
     pub plane: Vec<Plane>,
     /// Mean depth of the underside in the cell below the reference level of the bed along n at X = 0, m.
     pub depth: Vec<f64>,
-    /// How the depths in the cell lie about it.
+    /// Spread of the depths in the cell about it.
     pub spread: Vec<Spread>,
     /// Mean depth of the underside along n up to which the node carries nothing, m: of the unloaded surface where the cell is in the
     /// soil as a whole.
@@ -89,7 +89,7 @@ pub struct PatchNodes {
     pub before: Vec<f64>,
     /// Whether the foot has come over the node from the side, deeper than its surface.
     pub entered: Vec<bool>,
-    /// How much deeper than `depth` the underside lies, m: behind the peak of a wheel's stress; NaN elsewhere.
+    /// Depth of the underside below `depth`, m: behind the peak of a wheel's stress; NaN elsewhere.
     pub relief: Vec<f64>,
     /// Area in the tangent plane, m²; 0 where another port presses deeper.
     pub area: Vec<f64>,
@@ -97,7 +97,7 @@ pub struct PatchNodes {
     pub loaded_part: Vec<f64>,
     /// From the port's origin to the underside at the node along n, t1, t2, m.
     pub arm: Vec<[f64; 3]>,
-    /// How the underside faces the soil.
+    /// Orientation of the underside.
     pub facing: Vec<Facing>,
     /// Which of [`Patches::laws`] holds at the node.
     pub law: Vec<usize>,
@@ -150,7 +150,7 @@ impl PatchNodes {
         }
     }
 
-    /// How far the foot on nodes is below where it just touches, along n, m.
+    /// Depth of the foot on nodes below the height of first touch, along n, m.
     pub fn highest(&self, range: std::ops::Range<usize>) -> f64 {
         let loaded = range.filter(|k| self.area[*k] > 0.0);
         loaded.fold(f64::NEG_INFINITY, |h, k| {
@@ -194,7 +194,7 @@ impl PatchNodes {
         self.facing.clear();
     }
 
-    /// What a law keeps of node k.
+    /// State of a law at node k.
     #[inline]
     pub fn kept(&self, k: usize) -> &[f64] {
         &self.memory[k * self.doubles..(k + 1) * self.doubles]

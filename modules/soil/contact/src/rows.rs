@@ -13,9 +13,9 @@ pub struct Rows {
     cells: Vec<u32>,
     /// First node of the patch.
     start: usize,
-    /// How far the slope of each node is meant, 0 … 1.
+    /// Weight of the slope of each node, 0 … 1.
     pub weights: Vec<f64>,
-    /// Where the sides of a contact lie, world x and y from the port, m.
+    /// Places of the sides of a contact, world x and y from the port, m.
     pub places: Vec<[f64; 2]>,
 }
 
@@ -50,7 +50,7 @@ impl Rows {
         }
     }
 
-    /// How far the slope of node k is meant.
+    /// Weight of the slope of node k.
     #[inline]
     pub fn weight(&self, k: usize) -> f64 {
         self.weights[k - self.start]

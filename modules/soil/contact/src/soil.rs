@@ -27,7 +27,7 @@ use terraglue_subsystem::{
 const FEW_NODES: u32 = 3;
 const FEW_NODES_COMMITS: u32 = 100;
 
-/// Where the material under and around a foot goes.
+/// Motion of the material under and around a foot.
 pub trait Material: Send {
     /// Exact copy of its own committed state.
     type Saved: Default + Send + Persist;

@@ -1,4 +1,4 @@
-//! How the depths of an underside lie about their mean in the cell of a node, and the mean of a pressure over them.
+//! Spread of the depths of an underside about their mean in the cell of a node, and the mean of a pressure over them.
 //!
 //! Heights above the lowest point of the underside in the cell are taken as h(s) = H·(c·s + (1 − c)·s²), s from 0 to 1 alike over the
 //! cell. c = 1 is an inclined plane, cut along an axis; c = 0 the lowest line of a cylinder at the border of the cell; c = 2 a corner.
@@ -15,7 +15,7 @@ pub struct Spread {
     straight: f64,
     /// Half the range that evenly spread heights of the same standard deviation have, whatever print lies below, vertical, m.
     pub whole: f64,
-    /// How much deeper the node lies than the cell in the mean, along n, m.
+    /// Depth of the node below the mean of the cell, along n, m.
     pub below: f64,
     /// Half the range of depths of the print that lay there when the contact began, along n, m.
     pub print: f64,
@@ -63,7 +63,7 @@ impl Spread {
         2.0 * height / self.range / (c + (c * c + 4.0 * square * height / self.range).sqrt())
     }
 
-    /// How far the lowest point of an underside at the mean depth `depth` lies below `top`, m.
+    /// Depth of the lowest point of an underside at the mean depth `depth` below `top`, m.
     fn inside(&self, depth: f64, top: f64) -> f64 {
         depth - top + self.low
     }
@@ -98,8 +98,8 @@ impl Spread {
         share * self.whole
     }
 
-    /// Where to look for the mean of a pressure over what lies deeper than `top` (m) of a cell at the mean depth `depth`; `None`: nothing
-    /// does.
+    /// Sample points for the mean of a pressure over the part deeper than `top` (m) of a cell at the mean depth
+    /// `depth`; `None`: no part is.
     #[inline]
     pub fn look(&self, depth: f64, top: f64) -> Option<Look> {
         let (deepest, inside) = (depth + self.low, self.inside(depth, top));

@@ -12,7 +12,7 @@ use crate::vectors::{displacement, dot};
 use terraglue_ground::Lattice;
 use terraglue_subsystem::{Port, Result};
 
-/// How far a contact has pushed the soil beside it, elastically. Part of the committed state.
+/// Elastic displacement of the soil beside a contact. Part of the committed state.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Push {
     /// Key of the port.
@@ -52,7 +52,7 @@ pub struct Wall {
     pub before: Push,
 }
 
-/// What the soil beside a contact answers.
+/// Answer of the soil beside a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WallAnswer {
     /// Force on the body, world x and y, N, and moment about the vertical over the radius of gyration.
@@ -183,7 +183,7 @@ impl Wall {
 
 /// The ground beside a contact.
 pub struct Beside<'a> {
-    /// Where its nodes lie.
+    /// Lattice of its nodes.
     pub lattice: &'a Lattice,
     /// World height of the bed at a node and height of the loose soil on it, m.
     pub levels: &'a dyn Fn(i32, i32) -> [f64; 2],

@@ -22,7 +22,7 @@ const WHOLE: f64 = 0.999;
 /// Fewer covered nodes than these do not tell a circle.
 const FEW: usize = 4;
 
-/// What the soil remembers of a contact that rolls. Part of the committed state.
+/// Memory of a contact that rolls. Part of the committed state.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Memory {
     /// Key of the port.
@@ -109,8 +109,8 @@ impl Wheel {
         self.heading.map(|c| if back { -c } else { c })
     }
 
-    /// Where points of the rim come down, along t1 and t2, unit length: ahead where it turns forward, whichever way the axle goes;
-    /// `None` where it is locked.
+    /// Direction in which points of the rim come down, along t1 and t2, unit length: ahead if it turns forward,
+    /// whichever way the axle goes; `None` if it is locked.
     pub fn entry(&self, x: &[f64; 6]) -> Option<[f64; 2]> {
         let [rim, _] = self.ways(x);
         (rim != 0.0).then(|| self.heading.map(|c| rim.signum() * c))
@@ -163,9 +163,9 @@ impl Wheel {
         (share > 0.0 && entry > 0.0).then_some(Shift { entry, peak: share * entry, before })
     }
 
-    /// How much less deep than it lies a node behind the peak counts, m: there the stress is that of the angle in front
-    /// which lies as far from the entry, in its share, as the node does from the exit at the bottom. `None` in
-    /// front of the peak and behind the bottom.
+    /// Reduction of the depth that counts for a node behind the peak, m: there the stress is that of the angle in front
+    /// which lies as far from the entry, in its share, as the node does from the exit at the bottom. `None` in front of
+    /// the peak and behind the bottom.
     pub fn relief(&self, shift: &Shift, arm: [f64; 3]) -> Option<f64> {
         let angle = self.angle(arm);
         if angle >= shift.peak || angle < 0.0 {
@@ -176,7 +176,7 @@ impl Wheel {
     }
 }
 
-/// Where the stress below a wheel is largest.
+/// Position of the largest stress below a wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shift {
     /// Angle at which the soil enters, rad.

@@ -1,5 +1,5 @@
-//! What a node bears: the pressure law where the face is level and nothing but the foot's weight acts, less on inclined faces
-//! and under shear, more where it is pushed sideways; and soil that was poured on the bed.
+//! Bearing capacity of a node: the pressure law if the face is level and nothing but the foot's weight acts, less on
+//! inclined faces and under shear, more if it is pushed sideways; and soil that was poured on the bed.
 //!
 //! The soil is elastic, p = k_u·(z − z₀) above its unloaded surface at the depth z₀, up to the pressure at which it yields:
 //! p ≤ s·V(z) + a + b·z. V is first loading of the bed (Bekker 1956 and others). Where loose soil lies on it, the bed is

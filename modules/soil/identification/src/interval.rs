@@ -19,7 +19,7 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// What intervals rest on.
+/// Basis of intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
     /// Whole curves were left out in turn, as many as there are.

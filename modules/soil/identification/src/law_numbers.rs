@@ -7,7 +7,7 @@ use terraglue_subsystem::{NodeLaw, Parameter, PressureAnswer, PressureNodes, Res
 /// Numbers to start from where a schema gives none: a loose soil.
 const TYPICAL: [(&str, f64); 3] = [("n", 1.0), ("k_c", 1400.0), ("k_phi", 820e3)];
 
-/// Where the search for a number starts: its default, else a typical value, else the middle of its range.
+/// Start of the search for a number: its default, else a typical value, else the middle of its range.
 pub fn start(p: &Parameter) -> f64 {
     let typical = TYPICAL.iter().find(|(name, _)| *name == p.name).map(|(_, x)| *x);
     let middle = match (p.min, p.max) {

@@ -7,7 +7,7 @@ use crate::plate_law::{FitError, Reading};
 /// A number that is to be found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Free {
-    /// Where the search starts.
+    /// Start of the search.
     pub start: f64,
     /// Smallest value.
     pub min: f64,
@@ -15,14 +15,14 @@ pub struct Free {
     pub max: f64,
 }
 
-/// What was found.
+/// Result of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumbersFit {
     /// The numbers in their order.
     pub numbers: Vec<f64>,
     /// 95 % confidence; NaN where the readings say nothing of a number, which is left at its start then.
     pub intervals: Vec<Interval>,
-    /// What the intervals rest on.
+    /// Basis of the intervals.
     pub basis: Basis,
     /// Root of the mean square of ln(p/p_measured).
     pub rms: f64,
@@ -68,7 +68,7 @@ fn logarithms(law: &mut Pressures, x: &[f64], readings: &[Reading]) -> Option<Ve
     good.then(|| p.iter().zip(readings).map(each).collect())
 }
 
-/// What least squares found.
+/// Result of least squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Least {
     /// The numbers in their order.

@@ -16,7 +16,7 @@ pub struct Fit {
     pub numbers: PlateNumbers,
     /// 95 % confidence intervals of A, B and n.
     pub intervals: [Interval; 3],
-    /// What the intervals rest on.
+    /// Basis of the intervals.
     pub basis: Basis,
     /// Root of the mean square of ln(p/p_measured) over the readings.
     pub rms: f64,

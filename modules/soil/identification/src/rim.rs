@@ -30,7 +30,7 @@ pub struct Rim {
     pub points: usize,
 }
 
-/// What a wheel does at a sinkage, per integral.
+/// State of a wheel at a sinkage, per integral.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rolling {
     /// Sinkage, m.

@@ -20,7 +20,7 @@ pub struct Wheel {
     pub load: Option<f64>,
 }
 
-/// What was measured at a slip.
+/// Measurement at a slip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelPoint {
     /// Slip 1 − v/(rω), from 0 to below 1.
@@ -33,7 +33,7 @@ pub struct WheelPoint {
     pub pull: f64,
 }
 
-/// What is known of the soil that bounds the search.
+/// Properties of the soil that bound the search.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SoilBounds {
     /// Cohesion, Pa.
@@ -65,12 +65,12 @@ impl std::error::Error for WheelError {}
 
 /// Points of the integrals.
 const POINTS: usize = 100;
-/// How far measured means are trusted: sinkage 5 %, drawbar pull 2.8 % of the load.
+/// Uncertainty of measured means: sinkage 5 %, drawbar pull 2.8 % of the load.
 const SCATTER: [f64; 2] = [0.05, 0.028];
 /// ln k_φ, n_0, n_1 of Ding's slip sinkage, shear strength between rim and soil without pressure (Pa), tan of their angle of
 /// friction, ln K.
 type WheelNumbers = [f64; 6];
-/// How far the answer is held to the start.
+/// Prior width about the start.
 const PRIOR: WheelNumbers = [3.0, 0.5, 0.6, 800.0, 0.3, 1.0];
 
 /// Keys of a scenario, and what they are.
@@ -92,7 +92,7 @@ pub struct WheelNumber {
     pub value: f64,
     /// 95 % confidence; NaN: unknown.
     pub interval: Interval,
-    /// What it is.
+    /// Its description.
     pub help: &'static str,
 }
 
@@ -108,7 +108,7 @@ pub struct WheelFit {
     at: WheelNumbers,
 }
 
-/// Where the search begins, beside what is known of the soil: exponent and modulus k_φ of its row.
+/// Start of the search, beside known properties of the soil: exponent and modulus k_φ of its row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelStart {
     /// Exponent.

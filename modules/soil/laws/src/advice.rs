@@ -1,4 +1,4 @@
-//! What of a soil's numbers is accepted and yet unlikely to be meant.
+//! Numbers of a soil that are accepted and yet unlikely to be meant.
 
 use crate::parameters::{Family, SoilParameters};
 use crate::softened::SMALL_CONTACT;
@@ -37,7 +37,7 @@ pub fn advice(config: &Config, regions: &[(String, Map<String, Value>)], gravity
     all
 }
 
-/// What the elastic line does to one soil.
+/// Effect of the elastic line on one soil.
 fn replaced_law(config: &Config, whose: &str, gravity: f64) -> Option<Vec<String>> {
     let soil = SoilParameters::from_config(config, gravity).ok()?;
     let stiffness = soil.elastic_stiffness_pa_m?;

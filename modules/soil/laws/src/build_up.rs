@@ -1,5 +1,5 @@
-//! What soil holds without pressure builds up over the first pressure, so that the strength does not jump where a foot begins
-//! to touch: over a tenth of the cohesion, in all laws alike.
+//! Strength of soil without pressure builds up over the first pressure, so that the strength does not jump when a foot
+//! begins to touch: over a tenth of the cohesion, in all laws alike.
 
 use terraglue_subsystem::Result;
 
@@ -35,7 +35,7 @@ pub(crate) fn built_up(
     Ok((y, d))
 }
 
-/// What a law that answers (stress, derivatives) at (pressure, slip) holds without pressure, Pa, and its friction
+/// Strength without pressure, Pa, of a law that answers (stress, derivatives) at (pressure, slip), and its friction
 /// once the soil has slipped far.
 pub(crate) fn cohesion_and_friction(at: impl Fn(f64, f64) -> Result<(f64, [f64; 2])>) -> Result<[f64; 2]> {
     let cohesion = at(0.0, FULL_SLIP)?.0;

@@ -51,16 +51,16 @@ pub struct SoilParameters {
     pub adhesion_pa: f64,
     /// Part of the mass of the cone of soil under a foot that moves with it; 0: soil has no inertia.
     pub added_mass: f64,
-    /// What concerns wheels alone.
+    /// Parameters of wheels alone.
     pub rolling: Rolling,
-    /// How the direction of motion and the slope of the underside enter.
+    /// Effect of the direction of motion and of the slope of the underside.
     pub direction: Direction,
 }
 
 /// Stiffness that no law comes near, Pa/m.
 const STIFF: f64 = 1e18;
 
-/// How the direction of motion and the slope of the underside of a body enter the pressure.
+/// Effect of the direction of motion and of the slope of the underside of a body on the pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
     /// Inclined faces bear less than level ones: [`crate::strength::slope_factor`].
@@ -162,7 +162,7 @@ fn strength_schema() -> Vec<Parameter> {
     ]
 }
 
-/// How the soil springs back, and what gravity changes.
+/// Parameters of the elastic rebound of the soil and of the effect of gravity.
 fn elastic_schema() -> Vec<Parameter> {
     vec![
         number(
@@ -188,7 +188,7 @@ fn elastic_schema() -> Vec<Parameter> {
     ]
 }
 
-/// What is between feet and soil.
+/// Parameters of the interface of feet and soil.
 fn interface_schema() -> Vec<Parameter> {
     vec![
         number(
@@ -275,7 +275,7 @@ impl Default for SoilParameters {
 }
 
 impl SoilParameters {
-    /// What a module that uses these laws takes from its scenario table. The usual spans are those of `models/soils.csv`,
+    /// Parameters of these laws in the scenario table of a module. The usual spans are those of `models/soils.csv`,
     /// widened by about three.
     pub fn schema() -> Vec<Parameter> {
         let mut parameters = pressure_schema();

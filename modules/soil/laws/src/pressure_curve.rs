@@ -25,7 +25,7 @@ pub struct PressureCurve {
     /// Depth from which first loading goes on straight, m; infinite where nothing sinks as deep. 0 where n = 1 and the modulus
     /// itself is bounded.
     stiff_limit: f64,
-    /// How a law that is no power law goes on there.
+    /// Continuation there of a law that is no power law.
     straight: Straight,
     law: FirstLoading,
 }

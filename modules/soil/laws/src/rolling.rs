@@ -1,4 +1,4 @@
-//! What concerns wheels alone: how their slip and the place of their largest stress enter the laws.
+//! Parameters of wheels alone: the effect of their slip and of the place of their largest stress on the laws.
 
 use crate::slip_sinkage::SlipSinkage;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
@@ -9,7 +9,7 @@ pub const SLIP_SINKAGES: [&str; 3] = ["none", "ding", "lyasko"];
 /// Options of wheels.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Rolling {
-    /// How slip digs.
+    /// Slip sinkage.
     pub sinkage: SlipSinkage,
     /// a_0 and a_1 of the angle of the largest stress, θ_m = (a_0 + a_1·s)·θ_f (Wong and Reece 1967, J. Terramechanics
     /// 4, eq. 3). `None`: the stress follows the depth and is largest at the bottom.
@@ -19,7 +19,7 @@ pub struct Rolling {
 }
 
 impl Rolling {
-    /// What a module takes from its scenario table.
+    /// Parameters in the scenario table of a module.
     pub fn schema() -> Vec<Parameter> {
         let number = |name, unit: &str, help| Parameter {
             unit: unit.into(),

@@ -115,7 +115,7 @@ impl ShearLaw {
         Self { travel, ..self.clone() }
     }
 
-    /// How much a slip along `u` counts.
+    /// Weight of a slip along `u`.
     #[inline]
     pub(crate) fn weight(&self, u: [f64; 2], length: f64) -> f64 {
         let Some(Travel { heading, ratio }) = self.travel else { return 1.0 };
@@ -243,8 +243,8 @@ impl ShearLaw {
     }
 }
 
-/// What a slip increment has done: its length, the slip counted since the contact began, d(yield)/d(length) and
-/// d(yield)/dp at fixed slip.
+/// Effect of a slip increment: its length, the slip counted since the contact began, d(yield)/d(length) and d(yield)/dp
+/// at fixed slip.
 pub(crate) struct Plastic {
     pub step: f64,
     pub slip: f64,

@@ -14,12 +14,12 @@ pub struct YieldNodes<'a> {
     pub pressure: &'a [f64],
     /// Slips since the contact began, m.
     pub slip: &'a [f64],
-    /// What a law with a state remembers of them.
+    /// State of a law with a state at them.
     pub kept: &'a [f64],
 }
 
 impl YieldNodes<'_> {
-    /// What the law remembers of node k.
+    /// State of the law at node k.
     #[inline]
     fn kept(&self, k: usize) -> &[f64] {
         let doubles = self.kept.len() / self.pressure.len().max(1);

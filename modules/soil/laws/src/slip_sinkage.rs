@@ -1,6 +1,6 @@
 //! Slip sinkage: a contact that slips digs itself in, so the pressure law softens with the slip.
 
-/// How the law of first loading depends on the slip s of a contact, 0 ≤ s ≤ 1.
+/// Dependence of the law of first loading on the slip s of a contact, 0 ≤ s ≤ 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[non_exhaustive]
 pub enum SlipSinkage {

@@ -1,4 +1,4 @@
-//! Where unloading is softer than a law: found once for a soil, and said to its user.
+//! Depths at which unloading is softer than a law: found once for a soil and reported to its user.
 
 use crate::pressure_law::PressureLaw;
 use crate::straight::STIFFEST;
@@ -26,7 +26,7 @@ pub struct Softened {
 }
 
 impl Softened {
-    /// What a user is told; `whose` follows "law", e.g. " of label 1".
+    /// Message to the user; `whose` follows "law", e.g. " of label 1".
     pub fn message(&self, whose: &str) -> String {
         format!(
             "`elastic_stiffness_pa_m` = {:e} is softer than the law{whose} from {:.3} mm on under a contact of b = {} mm; first \

@@ -12,7 +12,7 @@ const LINES: usize = 3;
 const DEPTHS: usize = 63;
 /// The deepest of them, m: no node remembers more.
 const DEEPEST: f64 = 1.0;
-/// Where a law without elastic limit is looked at first, m.
+/// First depth of evaluation of a law without elastic limit, m.
 const SHALLOWEST: f64 = 1e-9;
 /// Halvings of the distance between two depths.
 const HALVINGS: usize = 60;
@@ -127,7 +127,7 @@ fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Where before depth number k the law becomes steeper than `slope`.
+/// Depth before number k at which the law becomes steeper than `slope`.
 fn onset(law: &Look, slope: f64, row: &DepthSamples, k: usize) -> f64 {
     let (before, after) = (row.z[k - 1], row.z[k]);
     if row.slope[k - 1] > slope || row.slope[k] <= slope {

@@ -1,4 +1,4 @@
-//! What the theory of soil strength says of loads on soil: inclined loads, inclined faces, walls, loose soil, steep slopes.
+//! Theory of soil strength: inclined loads, inclined faces, walls, loose soil, steep slopes.
 //!
 //! Closed formulas without a fitted number: bearing capacity (Terzaghi 1943; Sokolovskii 1965; Vesić 1973), passive earth
 //! pressure (Rankine 1857), plates pushed into granular media at all angles (Li, Zhang and Goldman 2013).
@@ -74,7 +74,7 @@ pub fn width_factor(phi: f64) -> f64 {
     2.0 * (depth_factor(phi) + 1.0) * libm::tan(phi)
 }
 
-/// How much less soil bears under a load that is inclined because the contact carries shear.
+/// Reduction of the bearing capacity under a load that is inclined because the contact carries shear.
 ///
 /// The capacity at the depth z below a contact of the radius b is γ(z·N_q·i_q + 0.6·b·N_γ·i_γ), of which a level load finds
 /// γ(z·N_q + 0.6·b·N_γ) (Terzaghi 1943, art. 50, for discs). i_q = N_q(δ)/N_q(0) is exact for weightless soil with a

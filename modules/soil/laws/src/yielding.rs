@@ -22,7 +22,7 @@ const STANDS: f64 = 1e-9;
 pub struct Sheared<'a> {
     /// Histories.
     pub states: &'a [ShearState],
-    /// What a law with a state remembers of them.
+    /// State of a law with a state at them.
     pub kept: &'a [f64],
     /// Pressures, Pa; larger than zero.
     pub pressure: &'a [f64],
@@ -45,7 +45,7 @@ struct Slip {
     before: f64,
 }
 
-/// Where a node stands.
+/// Regime of a node.
 #[derive(Clone, Copy, PartialEq)]
 enum Stand {
     Elastic,

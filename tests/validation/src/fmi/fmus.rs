@@ -2,7 +2,7 @@
 
 use crate::process::{Outcome, command, must, write};
 use std::path::{Path, PathBuf};
-use terraglue_fmi::export::{Content, pack};
+use terraglue_fmi::export::{Compression, Content, pack};
 
 /// What every FMU shares. `calc` gives outputs from all values, `step` goes on by h.
 const FRAME: &str = r"
@@ -55,7 +55,7 @@ int fmi2GetStringStatus(Fmu *u, int k, const char **x) { return 3; }
 /// What an FMU without derivatives answers.
 const NO_SLOPE: &str = "int fmi2GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, double *x) { return 3; }";
 
-/// A variable: name, role (`p`arameter, `i`nput, `o`utput) and start value.
+/// A variable: name, role (`p`arameter, `i`nput, `o`utput, output of a `s`tate, which no input is seen in at once) and start value.
 pub type Variable<'a> = (&'a str, char, f64);
 
 /// Builds an FMU that knows the derivative of its last output by its first input, `slope` in C, and counts in the output
@@ -105,7 +105,7 @@ fn compile(
         ("modelDescription.xml".to_owned(), Content::Text(describe(variables, capabilities))),
         ("binaries/linux64/m.so".to_owned(), Content::File(library)),
     ];
-    pack(&fmu, &entries)?;
+    pack(&fmu, &entries, Compression::Deflate)?;
     Ok(fmu)
 }
 
@@ -121,8 +121,12 @@ fn describe(variables: &[Variable], capabilities: &str) -> String {
         )
     };
     let all: String = variables.iter().enumerate().map(one).collect();
-    let outputs = variables.iter().enumerate().filter(|(_, v)| v.1 == 'o');
-    let outputs: String = outputs.map(|(k, _)| format!("<Unknown index=\"{}\"/>", k + 1)).collect();
+    let output = |(k, (_, role, _)): (usize, &Variable)| match role {
+        'o' => Some(format!("<Unknown index=\"{}\"/>", k + 1)),
+        's' => Some(format!("<Unknown index=\"{}\" dependencies=\"\"/>", k + 1)),
+        _ => None,
+    };
+    let outputs: String = variables.iter().enumerate().filter_map(output).collect();
     format!(
         "<?xml version=\"1.0\"?><fmiModelDescription fmiVersion=\"2.0\" modelName=\"m\" guid=\"g\"><CoSimulation \
          modelIdentifier=\"m\" canGetAndSetFMUstate=\"true\" canHandleVariableCommunicationStepSize=\"true\"{capabilities}/>\

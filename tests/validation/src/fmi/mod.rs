@@ -1,4 +1,4 @@
-//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, cycles of life, cost, the reference
+//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, the order of a step, cycles of life, cost, the reference
 //! FMUs, those of other tools.
 
 mod cost;
@@ -7,6 +7,7 @@ pub(super) mod fmus;
 mod folder;
 mod hostile;
 mod loops;
+mod order;
 mod pair;
 mod reference;
 mod third_party;
@@ -21,10 +22,11 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 9] = [
+pub const PARTS: [Part; 10] = [
     ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
     ("turning", |context| turning::figures(&workplace(context)?)),
     ("loops", |context| loops::figures(&workplace(context)?)),
+    ("order", |context| order::figures(&workplace(context)?)),
     ("cycles", |context| cycles::figures(&workplace(context)?, context.quick)),
     ("archives", |context| hostile::archives::figures(&workplace(context)?, context)),
     ("behaviour", |context| hostile::behaviour::figures(&workplace(context)?, context)),

@@ -5,7 +5,7 @@
 //! The lexicographic rule makes cycling impossible in exact arithmetic; a bound on the pivots guards against
 //! rounding. The tableau is dense: these problems have as many unknowns as a robot has contacts.
 
-/// How the algorithm ended.
+/// Outcome of the algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// z solves the problem; number of pivots.

@@ -1,8 +1,8 @@
-//! Where the mesh files that a robot file names are: plain paths, `file://`, `package://` and `model://`.
+//! Paths of the mesh files that a robot file names: plain paths, `file://`, `package://` and `model://`.
 
 use std::path::{Path, PathBuf};
 
-/// What a robot file's names of files are relative to.
+/// Folders to which a robot file's names of files are relative.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub(crate) struct Folders {
     /// Folder of the robot file.

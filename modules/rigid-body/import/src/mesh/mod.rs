@@ -32,7 +32,7 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What a solid of density 1 weighs: volume (m³), centre (m), inertia about it over its mass (m²).
+/// Mass properties of a solid of density 1: volume (m³), centre (m), inertia about it over its mass (m²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Solid {
     pub volume: f64,
@@ -87,7 +87,7 @@ impl Mesh {
         })
     }
 
-    /// How far a point lies outside a convex mesh along the normals of its faces, m; negative inside.
+    /// Distance of a point outside a convex mesh along the normals of its faces, m; negative inside.
     fn beyond(&self, p: &[f64; 3]) -> f64 {
         let corner = |k: u32| Vector3::from(self.points[k as usize]);
         let of = |t: &[u32; 3]| {

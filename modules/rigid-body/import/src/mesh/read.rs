@@ -8,7 +8,7 @@ use std::path::Path;
 /// A file as it was read.
 pub(crate) struct Loaded {
     pub mesh: Mesh,
-    /// What the file says and nobody heeds.
+    /// Remark on content of the file that has no effect.
     pub remark: Option<String>,
 }
 

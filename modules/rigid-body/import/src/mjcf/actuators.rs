@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::model::{Drive, DriveKind};
 use roxmltree::Node;
 
-/// What an actuator does, along the coordinate of its transmission.
+/// Law of an actuator, along the coordinate of its transmission.
 struct Law {
     kind: DriveKind,
     /// N m/rad and N m s/rad of a servo on the coordinate.

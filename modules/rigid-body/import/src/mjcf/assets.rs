@@ -23,9 +23,9 @@ pub(super) struct MeshAsset {
     pub hull: Arc<Mesh>,
     /// Whether it is convex.
     pub convex: bool,
-    /// What it weighs: what it encloses, or its hull where it is open.
+    /// Solid for its mass: the enclosed one, or its hull if it is open.
     pub solid: Solid,
-    /// What was made of it.
+    /// Notice of the choice that was made.
     pub notice: String,
 }
 
@@ -159,7 +159,7 @@ fn stem(file: &str) -> Option<&str> {
     Path::new(file).file_stem().and_then(|s| s.to_str())
 }
 
-/// Where files of assets lie.
+/// Folders of the files of assets.
 struct Files {
     folders: Folders,
     strip: bool,

@@ -262,7 +262,7 @@ impl<'a> Defaults<'a> {
         self.whole.place(node.range().start)
     }
 
-    /// What is wrong with an element.
+    /// Error of an element.
     pub fn wrong(&self, e: &Element, problem: String) -> Error {
         let name = e.node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
         let (file, line) = self.place(e.node);

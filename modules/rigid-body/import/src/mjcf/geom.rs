@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 /// Density where a file gives neither mass nor density, kg/m³.
 const DENSITY: f64 = 1000.0;
 
-/// What a geom is.
+/// Kind of a geom.
 pub(crate) enum Geom {
     Shape(Box<Weighed>),
     Plane(Plane),
@@ -27,11 +27,11 @@ pub(super) struct Weighed {
     /// kg.
     pub mass: f64,
     pub solid: Solid,
-    /// What was made of it.
+    /// Notice of the choice that was made.
     pub notice: Option<String>,
 }
 
-/// What a geom is read with.
+/// Context in which a geom is read.
 #[derive(Clone, Copy)]
 pub(super) struct Around<'a> {
     pub assets: &'a Assets,

@@ -28,7 +28,7 @@ fn fixed(body: &str, parent: Option<usize>, child: usize, frame: Isometry3<f64>)
     }
 }
 
-/// What acts along the axis of a joint; `unit`: of its coordinate in rad or m.
+/// Forces along the axis of a joint; `unit`: of its coordinate in rad or m.
 fn axis_data(d: &Defaults, e: &Element, unit: f64) -> Result<AxisData, Error> {
     let not_negative = |what: &str| Ok(d.not_negative(e, what, "it would drive the joint")?.unwrap_or(0.0));
     Ok(AxisData {

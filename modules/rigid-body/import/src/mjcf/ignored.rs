@@ -4,9 +4,9 @@ use super::MjcfReader;
 use roxmltree::Node;
 use std::collections::BTreeMap;
 
-/// How an element says where it is turned.
+/// Attributes for the pose of an element.
 const TURNED: &[&str] = &["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"];
-/// What says nothing about the mechanics, or only tunes MuJoCo's solver and its soft limits.
+/// Attributes without effect on the mechanics, or that only tune MuJoCo's solver and its soft limits.
 const HARMLESS: &[&str] = &["name", "class", "group", "user", "rgba", "material"];
 
 /// Per element what is read, and what is without effect besides [`HARMLESS`].

@@ -14,7 +14,7 @@ pub(super) struct MergedFile {
 
 /// A stretch of the whole out of one file.
 struct Piece {
-    /// Where it begins in the whole.
+    /// Its start in the whole.
     start: usize,
     file: String,
     /// Line of its beginning in its file.
@@ -96,7 +96,7 @@ impl MergedFile {
 struct Origin<'a> {
     file: &'a str,
     text: &'a str,
-    /// Where included files lie.
+    /// Folder of the included files.
     folder: &'a Path,
 }
 

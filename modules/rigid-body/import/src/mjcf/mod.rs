@@ -107,7 +107,7 @@ fn empty(name: &str) -> Robot {
     }
 }
 
-/// Where an element of the tree is.
+/// Place of an element of the tree.
 #[derive(Clone, Copy)]
 struct ElementPlace<'a> {
     /// Body that it belongs to; none: the world.
@@ -178,7 +178,7 @@ impl<'d, 's> MjcfReader<'d, 's> {
         self.robot.warnings.push(text);
     }
 
-    /// What is to be said about an element, with its place.
+    /// A message about an element, with its place.
     fn place(&self, node: Node, what: &str) -> String {
         let (file, line) = self.d.place(node);
         let name = node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();

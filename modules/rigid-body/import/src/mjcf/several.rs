@@ -11,7 +11,7 @@ use crate::model::Body;
 use nalgebra::Isometry3;
 use roxmltree::Node;
 
-/// What a body between two joints carries of the whole.
+/// Share of the whole's mass that a body between two joints carries.
 const SHARE: f64 = 1e-6;
 
 impl MjcfReader<'_, '_> {

@@ -1,4 +1,4 @@
-//! What is said of every element before anything is read: finite numbers, names that are unique, default classes that exist.
+//! Checks of every element before anything is read: finite numbers, names that are unique, default classes that exist.
 
 use super::defaults::Defaults;
 use crate::error::Error;
@@ -25,7 +25,7 @@ pub(super) fn survey(d: &Defaults, root: Node) -> Result<(), Error> {
     Ok(())
 }
 
-/// What a name is unique among.
+/// Kind of element within which a name is unique.
 fn kind<'a>(node: Node<'a, '_>) -> &'a str {
     let section = node.parent_element().map_or("", |p| p.tag_name().name());
     match (SHARED.iter().find(|s| **s == section), node.tag_name().name()) {

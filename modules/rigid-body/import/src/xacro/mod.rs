@@ -12,10 +12,10 @@ use std::process::{Command, Output, Stdio};
 
 const EXPAND: &str = include_str!("expand.py");
 
-/// What `expand.py` ends with where the package is missing.
+/// Exit code of `expand.py` if the package is missing.
 const MISSING: i32 = 77;
 
-/// How a process ends that has used up its time.
+/// Signal that ends a process that has used up its time.
 const ALARM: i32 = 14;
 
 /// Whether a text is xacro: an element of it, or one of its expressions.

@@ -57,7 +57,7 @@ impl Window {
         any
     }
 
-    /// What cohesion does not hold at a place over such a face, units. What comes in a round moves to its end.
+    /// Units at a place that cohesion does not hold over such a face. Units that arrive in a round move to its end.
     #[inline(always)]
     pub(super) fn free(&self, at: usize, face: Face) -> i32 {
         let held = if face == Face::Sheds { &self.beds } else { &self.resting };

@@ -38,7 +38,7 @@ pub struct Feet {
     laws: Vec<Law>,
 }
 
-/// What the bodies know of a moment: all but the soil's state.
+/// State of the bodies at a moment: all but the soil's state.
 #[derive(Clone)]
 pub struct Moment {
     bodies: Vec<Placed>,

@@ -6,7 +6,7 @@ use terraglue_subsystem::{Geometry, Pose};
 const RADIUS: f64 = 0.04;
 const STRIDE: f64 = 0.16;
 const SPEED: f64 = 0.32;
-/// Where the walk begins, m.
+/// Start of the walk, m.
 const START: f64 = -4.0;
 const HIPS: [([f64; 2], f64); 6] = [
     ([0.3, 0.25], 0.0),
@@ -19,7 +19,7 @@ const HIPS: [([f64; 2], f64); 6] = [
 /// Between two walkers, m.
 const APART: f64 = 5.0;
 
-/// Where foot k of a walk is at time t (s): cycle 1 s, half of it on the ground and 2 cm in it.
+/// Pose of foot k of a walk at time t (s): cycle 1 s, half of it on the ground and 2 cm in it.
 fn pose(k: usize, t: f64) -> Pose {
     let ([hip_x, hip_y], phase) = HIPS[k % 6];
     let u = (t + phase).fract();

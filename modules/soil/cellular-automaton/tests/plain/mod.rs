@@ -73,7 +73,7 @@ impl Plain {
         self.heights[k] + self.load[k]
     }
 
-    /// What one path may bring into a node.
+    /// Largest amount that one path may bring into a node.
     fn inlet(&self, i: i32, j: i32) -> i32 {
         if i < 0 || j < 0 || i >= self.size[0] || j >= self.size[1] {
             return 0;

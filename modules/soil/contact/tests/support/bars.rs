@@ -1,4 +1,4 @@
-//! What every soil on a height field must hold, called by the tests of each.
+//! Properties of every soil on a height field, called by the tests of each.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use super::support::*;
@@ -229,7 +229,7 @@ pub fn regions_have_their_laws<M: Module>() {
 }
 
 /// Plates under prescribed motion follow the closed form p = (k_c/b + k_φ)·zⁿ.
-/// Where material `stays`, the plate meets the same soil again after it was lifted.
+/// If material `stays`, the plate meets the same soil again after it was lifted.
 pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], stays: bool) {
     for (geometry, b, area) in [
         (
@@ -428,7 +428,7 @@ pub fn states_are_exact<M: Module>() {
     assert!(fixture.soil.restore_state(2).is_err() && fixture.soil.save_state(99).is_err());
 }
 
-/// What the foot puts in is stored or dissipated, but for what the soil still owes.
+/// Work of the foot is stored or dissipated, except for the elastic energy still in the soil.
 pub fn energy_balances<M: Module>(config: &str) {
     let mut fixture = Fixture::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
     for k in 0..1000 {

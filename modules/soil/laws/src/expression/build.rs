@@ -12,7 +12,7 @@ pub struct Builder {
     full: bool,
 }
 
-/// What a symbol becomes.
+/// Binding of a symbol.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Binding {
     /// Variable number k.

@@ -60,7 +60,7 @@ pub fn check(tree: &Tree, symbols: &[Symbol], result: &Dimension) -> Result<(), 
     Ok(())
 }
 
-/// How many values of the parameters are tried.
+/// Number of values of the parameters that are tried.
 pub const SAMPLES: usize = 5;
 
 fn terms(tree: &Tree, dimensions: &[Dimension]) -> String {

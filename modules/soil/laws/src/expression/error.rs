@@ -1,4 +1,4 @@
-//! What is wrong with the text of a law, and where.
+//! Errors in the text of a law, with their place.
 
 use std::fmt;
 use std::ops::Range;
@@ -10,7 +10,7 @@ pub struct ExpressionError {
     pub text: String,
     /// Bytes of the offending part.
     pub span: Range<usize>,
-    /// What is wrong.
+    /// Description of the error.
     pub message: String,
     /// The way out, where one is known.
     pub help: Option<String>,

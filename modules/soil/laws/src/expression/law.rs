@@ -35,7 +35,7 @@ pub struct PressureExpression {
 }
 
 impl PressureSinkage for PressureExpression {
-    /// Where the folded law is a power law, it is that one.
+    /// If the folded law is a power law, it is that one.
     fn under(&self, b: f64) -> FirstLoading {
         let program = self.at_size(b);
         match program.power_law() {
@@ -111,7 +111,7 @@ pub struct SoilExpressions {
 }
 
 impl SoilExpressions {
-    /// What a soil that takes laws from the scenario adds to its schema.
+    /// Parameters that a soil with laws from the scenario adds to its schema.
     pub fn schema() -> Vec<Parameter> {
         let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
         vec![

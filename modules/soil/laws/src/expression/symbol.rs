@@ -3,7 +3,7 @@
 use super::error::ExpressionError;
 use super::{Binary, Function};
 
-/// What a symbol stands for.
+/// Role of a symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Differs from node to node: depth, pressure, shear displacement. Derivatives are taken by it.

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 use terraglue::recording::Recording;
-use terraglue_fmi::export::{Content, pack};
+use terraglue_fmi::export::{Compression, Content, pack};
 
 const CODE: &str = include_str!("fmu.c");
 const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -159,7 +159,7 @@ fn fmu(folder: &Path) -> Outcome<std::path::PathBuf> {
         ("modelDescription.xml".to_owned(), Content::Text(DESCRIPTION.into())),
         ("binaries/linux64/m.so".to_owned(), Content::File(library)),
     ];
-    pack(&fmu, &entries)?;
+    pack(&fmu, &entries, Compression::Deflate)?;
     Ok(fmu)
 }
 

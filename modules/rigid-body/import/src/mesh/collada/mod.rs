@@ -16,7 +16,7 @@ const DEEPEST: usize = 64;
 /// A triangle, m.
 pub(super) type Triangle = [[f64; 3]; 3];
 
-/// What a file holds.
+/// Contents of a file.
 pub(super) struct Scene {
     pub triangles: Vec<Triangle>,
     /// Which axis the file calls up.
@@ -174,7 +174,7 @@ fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|n| n.has_tag_name(name))
 }
 
-/// What is wrong with an element, after its line and name.
+/// Error of an element, after its line and name.
 fn wrong(node: Node, problem: &str) -> String {
     let line = node.document().text_pos_at(node.range().start).row;
     let name = node.attribute("id").map(|n| format!(" `{n}`")).unwrap_or_default();

@@ -1,0 +1,194 @@
+//! Loops of connections that are solved within a step (`order = "iterate"`): FMUs repeat the step until the outputs at its end are
+//! those that it was made with.
+//!
+//! An FMU whose outputs follow its inputs at once takes the value at the end of the step; any other one takes the mean of the values
+//! at start and end, which makes the step of second order. Each repetition begins with the state at the start of the step.
+//! Relaxation after Aitken's Δ² process for vectors (Irons and Tuck, 1969; Küttler and Wall, 2008, eq. 44).
+
+use super::schedule::{Span, StepSchedule};
+use super::step_order::StepOrder;
+use super::subsystems::Subsystems;
+use crate::signals::{Faults, Links, held};
+use std::sync::atomic::Ordering;
+use terraglue_diagnostics::Result;
+use terraglue_host::Instance;
+use terraglue_scenario::ModuleKind;
+use terraglue_subsystem::{Capabilities, Response};
+
+/// Most repetitions of a step.
+const MOST: u32 = 60;
+/// Largest difference of a value and the one that the step was made with, relative to the larger of it and 1e-3 in its unit.
+const TOLERANCE: f64 = 1e-10;
+
+/// The way out of a loop that cannot be iterated.
+pub(super) const NO_LOOP: &str =
+    "leave `order = \"iterate\"` of its connections out: then values of a loop are late by a step";
+
+/// A connection of a loop.
+#[derive(Debug)]
+struct Iterated {
+    link: usize,
+    /// Whether its target takes the value at the end of the step.
+    takes_end: bool,
+}
+
+/// All loops of a run.
+#[derive(Debug, Default)]
+pub(super) struct Loops {
+    links: Vec<Iterated>,
+    /// Those that repeat the step, ascending.
+    members: Vec<usize>,
+    /// Number under which they keep the state at its start.
+    state: u32,
+    /// Values at the start of the step, those that the trial was made with, and the residual before.
+    start: Vec<f64>,
+    guess: Vec<f64>,
+    before: Vec<f64>,
+    relaxation: f64,
+}
+
+impl Loops {
+    /// The loops of a run; `state`: number of a state that nobody else keeps.
+    ///
+    /// # Errors
+    /// What takes part and cannot repeat a step, in words.
+    pub fn new(
+        links: &Links,
+        faults: &Faults,
+        instances: &[Instance],
+        schedules: &[StepSchedule],
+        (order, state): (&StepOrder, u32),
+    ) -> std::result::Result<Self, String> {
+        let iterated = links.numbers.iter().enumerate().filter(|(_, link)| link.is_iterated());
+        let follows = |slot: usize| instances[slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
+        let iterated: Vec<Iterated> =
+            iterated.map(|(k, l)| Iterated { link: k, takes_end: follows(l.slots()[1]) }).collect();
+        let mut loops = Self { state, ..Self::default() };
+        let mut open: Vec<usize> = iterated.iter().map(|i| links.numbers[i.link].slots()[1]).collect();
+        while let Some(slot) = open.pop() {
+            if loops.members.contains(&slot) {
+                continue;
+            }
+            loops.members.push(slot);
+            let passes = |k: &usize| order.is_within(*k) && links.numbers[*k].slots()[0] == slot;
+            open.extend((0..links.numbers.len()).filter(passes).map(|k| links.numbers[k].slots()[1]));
+        }
+        loops.members.sort_unstable();
+        for slot in &loops.members {
+            let (instance, schedule) = (&instances[*slot], &schedules[*slot]);
+            if let Some(why) = cannot_repeat(instance, schedule) {
+                return Err(format!(
+                    "`{}` {why}: it cannot take part in a loop that is iterated",
+                    instance.name()
+                ));
+            }
+        }
+        if let Some(faulty) = iterated.iter().find(|i| faults.change(i.link)) {
+            let names = links.numbers[faulty.link].names(instances);
+            return Err(format!("a fault changes {}: it cannot be iterated", names.join(", ")));
+        }
+        loops.links = iterated;
+        Ok(loops)
+    }
+
+    /// Whether there is nothing to solve.
+    pub fn is_empty(&self) -> bool {
+        self.links.is_empty()
+    }
+
+    /// Whether a connection of numbers is solved here.
+    pub fn has(&self, link: usize) -> bool {
+        self.links.iter().any(|own| own.link == link)
+    }
+
+    /// Keeps states and values at the start of the step; the first trial is made with the values of the start.
+    pub fn begin(&mut self, links: &Links, instances: &mut [Instance]) -> Result {
+        let values = |i: &Iterated| {
+            let link = &links.numbers[i.link];
+            (0..link.count()).map(|k| link.value(k)).collect::<Vec<f64>>()
+        };
+        self.start = self.links.iter().flat_map(values).collect();
+        self.guess.clone_from(&self.start);
+        self.before.clear();
+        self.relaxation = 1.0;
+        self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
+    }
+
+    /// Repeats the trials of the members until the values stand. What was not solved, if so.
+    pub fn solve(
+        &mut self,
+        order: &StepOrder,
+        span: &mut Span,
+        links: &mut Links,
+        subsystems: &mut Subsystems,
+    ) -> Result<Option<String>> {
+        for _ in 0..MOST {
+            if span.broken.load(Ordering::Relaxed) || self.stands(links, &subsystems.instances)? {
+                return Ok(None);
+            }
+            self.members.iter().try_for_each(|slot| subsystems.instances[*slot].restore_state(self.state))?;
+            self.set(links, &mut subsystems.instances)?;
+            for level in 0..order.levels() {
+                span.level = level as u32;
+                order.pass_on(level, links, &mut subsystems.instances)?;
+                let mut out =
+                    Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: 0.0, flags: 0 };
+                for slot in &self.members {
+                    let instance = &mut subsystems.instances[*slot];
+                    subsystems.schedules[*slot].try_alone(instance, span, &mut out);
+                }
+            }
+        }
+        let names: Vec<&str> = self.members.iter().map(|slot| subsystems.instances[*slot].name()).collect();
+        Ok(Some(format!("the loop of {} was not solved in {MOST} repetitions", names.join(", "))))
+    }
+
+    /// Whether the outputs are those that the trial was made with; if not, a better guess is there.
+    fn stands(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
+        let mut residual = Vec::with_capacity(self.guess.len());
+        let mut stands = true;
+        for own in &self.links {
+            for value in links.numbers[own.link].read(instances)? {
+                let guess = self.guess[residual.len()];
+                stands &= (value - guess).abs() <= TOLERANCE * value.abs().max(guess.abs()).max(1e-3);
+                residual.push(value - guess);
+            }
+        }
+        if self.before.len() == residual.len() {
+            let change = || residual.iter().zip(&self.before).map(|(now, before)| now - before);
+            let square: f64 = change().map(|d| d * d).sum();
+            let product: f64 = self.before.iter().zip(change()).map(|(before, d)| before * d).sum();
+            if square > 0.0 {
+                self.relaxation = (-self.relaxation * product / square).clamp(-10.0, 10.0);
+            }
+        }
+        self.guess.iter_mut().zip(&residual).for_each(|(guess, r)| *guess += self.relaxation * r);
+        self.before = residual;
+        Ok(stands)
+    }
+
+    /// Sets the inputs to what the guess makes of them.
+    fn set(&self, links: &Links, instances: &mut [Instance]) -> Result {
+        let mut first = 0;
+        for own in &self.links {
+            let link = &links.numbers[own.link];
+            let pairs = self.start[first..].iter().zip(&self.guess[first..]).take(link.count());
+            let values: Vec<f64> = pairs.map(|(start, end)| held(own.takes_end, *start, *end)).collect();
+            link.write(instances, &values)?;
+            first += link.count();
+        }
+        Ok(())
+    }
+}
+
+/// Why a subsystem cannot repeat a step by itself.
+fn cannot_repeat(instance: &Instance, schedule: &StepSchedule) -> Option<&'static str> {
+    let can = |what| instance.capabilities().has(what);
+    match schedule {
+        _ if !ModuleKind::is_fmu(instance.module()) => Some("is no FMU"),
+        StepSchedule { glued: true, .. } => Some("is glued"),
+        StepSchedule { step_multiple: 2.., .. } => Some("makes steps of another length"),
+        _ if !(can(Capabilities::RETRY) && can(Capabilities::STATE)) => Some("cannot save its state"),
+        _ => None,
+    }
+}

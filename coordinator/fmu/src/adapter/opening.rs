@@ -1,0 +1,59 @@
+//! What an FMU is opened with, and what is said of it then.
+
+use crate::settings::Options;
+use crate::trace;
+use std::sync::Arc;
+use terraglue_fmi::{Fmu, InstanceOptions, LogLine, ModelDescription};
+use terraglue_subsystem::{Error, Host, LogLevel, Result};
+
+/// Folder of FMUs that talk over a simulated bus.
+const BUS: &str = "extra/org.fmi-standard.fmi-ls-bus";
+/// What is not done for them.
+const NO_BUS: &str = "it is made for a bus (FMI-LS-BUS), which is not simulated: a frame in a clocked binary variable is passed on like any value, \
+                      one step late, and a countdown clock of one FMU ticks no clock of another within an event";
+
+/// What an instance is made with.
+pub(super) fn of_instance(options: &Options, host: &Arc<dyn Host>) -> Result<InstanceOptions> {
+    let sink = host.clone();
+    let log = Box::new(move |line: &LogLine| sink.log(line.level, &line.text));
+    let trace = options.trace.as_deref().map(|path| {
+        trace::to_file(path).map_err(|e| Error::Refused(format!("`trace`: {}: {e}", path.display())))
+    });
+    let (event_mode, log_categories) = (options.event_mode, options.log_categories.clone());
+    let plain = InstanceOptions::new(host.name(), log);
+    Ok(InstanceOptions { event_mode, log_categories, trace: trace.transpose()?, ..plain })
+}
+
+/// Tells the defects of a description; where `strict` is wanted, the first one refuses the FMU.
+pub(super) fn warn(fmu: &Fmu, strict: bool, host: &dyn Host) -> Result {
+    if fmu.folder().join(BUS).is_dir() {
+        host.log(LogLevel::Warning, NO_BUS);
+    }
+    let warnings = fmu.description().warnings();
+    if let (true, Some(first)) = (strict, warnings.first()) {
+        let reason = format!("its description has defects, which strict = true refuses: {first}");
+        return Err(Error::Refused(reason));
+    }
+    warnings.iter().for_each(|warning| host.log(LogLevel::Warning, warning));
+    Ok(())
+}
+
+/// Says where steps of one length only are not those that the description names.
+#[cold]
+pub(super) fn warn_of_length(description: &ModelDescription, h: f64, host: &dyn Host) {
+    let capabilities = &description.capabilities;
+    let named = capabilities.fixed_step.or(description.experiment.step).filter(|named| *named > 0.0);
+    let Some(named) = named.filter(|_| !capabilities.variable_step && h > 0.0) else { return };
+    let whole = |long: f64, short: f64| (long / short - (long / short).round()).abs() < 1e-6;
+    if h >= named && whole(h, named) {
+        return;
+    }
+    let cure = match h < named && whole(named, h) {
+        true => format!("`step_multiple = {}` makes its steps as long", (named / h).round()),
+        false => format!("`time.step_s = {named}`, or a whole part of it and `step_multiple`, fits"),
+    };
+    let text = format!(
+        "the FMU makes steps of one length, and its description says {named} s; it is stepped by {h} s: {cure}"
+    );
+    host.log(LogLevel::Warning, &text);
+}

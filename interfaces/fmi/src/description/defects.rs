@@ -1,0 +1,251 @@
+//! Defects of a description that do not make the FMU unusable: where it contradicts the standard, with line and element.
+
+use super::model::{Causality, Initial, ModelDescription, Start, Variability, Variable, Version};
+use super::printable;
+use terraglue_subsystem::ValueType;
+
+/// Kinds of defects; of each, a run warns once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum DefectKind {
+    Enumeration,
+    Range,
+    StartRange,
+    StartCount,
+    StartMissing,
+    StartCalculated,
+    Unit,
+    BaseUnit,
+    Clock,
+    Role,
+    Continuous,
+    Structure,
+}
+
+/// A defect of a description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Defect {
+    /// Its kind.
+    pub kind: DefectKind,
+    /// Line in `modelDescription.xml`; none where an element is missing.
+    pub line: Option<u32>,
+    /// One sentence with the name of the variable.
+    pub message: String,
+}
+
+impl std::fmt::Display for Defect {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "line {line}: {}", self.message),
+            None => f.write_str(&self.message),
+        }
+    }
+}
+
+/// Finds defects of one variable.
+type Rule = fn(&ModelDescription, &Variable) -> Option<String>;
+
+const RULES: [(DefectKind, Rule); 11] = [
+    (DefectKind::Enumeration, enumeration),
+    (DefectKind::Range, range),
+    (DefectKind::StartRange, start_range),
+    (DefectKind::StartCount, start_count),
+    (DefectKind::StartMissing, start_missing),
+    (DefectKind::StartCalculated, start_calculated),
+    (DefectKind::Unit, unit),
+    (DefectKind::BaseUnit, base_unit),
+    (DefectKind::Clock, clock),
+    (DefectKind::Role, role),
+    (DefectKind::Continuous, continuous),
+];
+
+impl ModelDescription {
+    /// Contradictions to the standard that do not make the FMU unusable.
+    pub fn defects(&self) -> Vec<Defect> {
+        all(self)
+    }
+
+    /// Warnings of a run: [`ModelDescription::problems`], and one for each kind of defect.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut all = self.problems.clone();
+        all.extend(grouped(&self.defects()));
+        all
+    }
+}
+
+/// All defects, in the order of the variables.
+fn all(description: &ModelDescription) -> Vec<Defect> {
+    let own = description.variables.iter().filter(|v| !v.alias);
+    let of_variable = |v| {
+        RULES.iter().filter_map(move |(kind, rule)| {
+            let found = rule(description, v)?;
+            let message = format!("`{}` {found}", printable(&v.name));
+            Some(Defect { kind: *kind, line: Some(v.line), message })
+        })
+    };
+    own.flat_map(of_variable).chain(structure(description)).collect()
+}
+
+/// One warning for each kind of defect: the first of them, and how many more there are.
+fn grouped(defects: &[Defect]) -> Vec<String> {
+    let mut kinds: Vec<DefectKind> = Vec::new();
+    defects.iter().for_each(|d| {
+        if !kinds.contains(&d.kind) {
+            kinds.push(d.kind);
+        }
+    });
+    let warning = |kind: &DefectKind| {
+        let mut same = defects.iter().filter(|d| d.kind == *kind);
+        let first = same.next().map(Defect::to_string).unwrap_or_default();
+        match same.count() {
+            0 => first,
+            more => format!("{first}; {more} more like it are listed by `terraglue fmu check`"),
+        }
+    };
+    kinds.iter().map(warning).collect()
+}
+
+fn enumeration(_: &ModelDescription, v: &Variable) -> Option<String> {
+    (v.value_type == ValueType::Enumeration && v.items.is_empty())
+        .then(|| "is an enumeration without a declared type that lists its items".into())
+}
+
+/// Numbers that a type of whole numbers can hold.
+fn limits(value_type: ValueType) -> Option<(i128, i128)> {
+    Some(match value_type {
+        ValueType::I8 => (i8::MIN.into(), i8::MAX.into()),
+        ValueType::U8 => (0, u8::MAX.into()),
+        ValueType::I16 => (i16::MIN.into(), i16::MAX.into()),
+        ValueType::U16 => (0, u16::MAX.into()),
+        ValueType::I32 => (i32::MIN.into(), i32::MAX.into()),
+        ValueType::U32 => (0, u32::MAX.into()),
+        ValueType::I64 | ValueType::Enumeration => (i64::MIN.into(), i64::MAX.into()),
+        ValueType::U64 => (0, u64::MAX.into()),
+        _ => return None,
+    })
+}
+
+fn range(_: &ModelDescription, v: &Variable) -> Option<String> {
+    (v.min > v.max).then(|| format!("has min = {} above max = {}", v.min, v.max))
+}
+
+fn start_range(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let bounds = || format!("outside its range from {} to {}", v.min, v.max);
+    match &v.start {
+        Start::Numbers(numbers) => {
+            let outside = numbers.iter().find(|x| v.min <= v.max && (**x < v.min || **x > v.max))?;
+            Some(format!("has the start value {outside} {}", bounds()))
+        }
+        Start::Integers(numbers) => {
+            if let Some((low, high)) = limits(v.value_type)
+                && let Some(x) = numbers.iter().find(|x| !(low..=high).contains(*x))
+            {
+                return Some(format!("has the start value {x}, which {:?} cannot hold", v.value_type));
+            }
+            if let Some(x) =
+                numbers.iter().find(|x| v.min <= v.max && ((**x as f64) < v.min || **x as f64 > v.max))
+            {
+                return Some(format!("has the start value {x} {}", bounds()));
+            }
+            let item = |x: &&i128| v.items.iter().all(|(_, value)| i128::from(*value) != **x);
+            let none = numbers.iter().find(item).filter(|_| !v.items.is_empty())?;
+            Some(format!("has the start value {none}, which is no item of its enumeration"))
+        }
+        _ => None,
+    }
+}
+
+fn start_count(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let count = match &v.start {
+        Start::None => return None,
+        Start::Numbers(x) => x.len(),
+        Start::Integers(x) => x.len(),
+        Start::Texts(x) => x.len(),
+        Start::Bytes(x) => x.len(),
+    };
+    (count != 1 && count != v.len()).then(|| match v.sizes.is_empty() {
+        true => format!("has {count} start values and is a scalar"),
+        false => format!("has {count} start values for {} elements", v.len()),
+    })
+}
+
+fn start_missing(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let exact = matches!(v.initial, Some(Initial::Exact | Initial::Approx));
+    let fixed = v.variability == Variability::Constant
+        || matches!(v.causality, Causality::Input | Causality::Parameter | Causality::StructuralParameter)
+            && v.initial != Some(Initial::Calculated);
+    (v.start == Start::None && v.value_type != ValueType::Clock && (exact || fixed))
+        .then(|| "needs a start value".into())
+}
+
+fn start_calculated(_: &ModelDescription, v: &Variable) -> Option<String> {
+    if v.start == Start::None {
+        return None;
+    }
+    match (v.causality, v.initial) {
+        (Causality::Independent, _) => Some("is the independent variable and has a start value".into()),
+        (_, Some(Initial::Calculated)) => Some("is initially calculated and has a start value".into()),
+        _ => None,
+    }
+}
+
+fn unit(d: &ModelDescription, v: &Variable) -> Option<String> {
+    let unit = v.unit.as_ref()?;
+    let defined = d.units.iter().any(|(n, _)| n == unit) || d.plain_units.contains(unit);
+    (!defined).then(|| format!("has the unit `{}`, which UnitDefinitions does not define", printable(unit)))
+}
+
+fn base_unit(d: &ModelDescription, v: &Variable) -> Option<String> {
+    let unit = v.unit.as_ref().filter(|u| d.plain_units.contains(u))?;
+    Some(format!("has the unit `{}`, whose base units are not given", printable(unit)))
+}
+
+fn clock(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let known = v.ticks.is_some() || v.told.is_some() || v.triggered;
+    (v.value_type == ValueType::Clock && v.causality == Causality::Input && !known)
+        .then(|| "is a clock without an intervalVariability of the standard".into())
+}
+
+/// Combinations of causality and variability that the standards forbid (FMI 2.0.4 §2.2.7, FMI 3.0.2 §2.4.7.5).
+fn role(_: &ModelDescription, v: &Variable) -> Option<String> {
+    use Causality as C;
+    use Variability as V;
+    let parameter = matches!(v.causality, C::Parameter | C::CalculatedParameter | C::StructuralParameter);
+    let wrong = match v.variability {
+        V::Constant => parameter || matches!(v.causality, C::Input | C::Independent),
+        V::Fixed | V::Tunable => matches!(v.causality, C::Input | C::Output | C::Independent),
+        V::Discrete => parameter || v.causality == C::Independent,
+        V::Continuous => parameter,
+    };
+    wrong.then(|| format!("is {:?} and {:?}, which no variable can be", v.causality, v.variability))
+}
+
+fn continuous(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let float = matches!(v.value_type, ValueType::F64 | ValueType::F32);
+    (v.variability == Variability::Continuous && !float)
+        .then(|| format!("is continuous; {:?} changes in steps only", v.value_type))
+}
+
+/// Outputs and the model structure: each output stands there once, and nothing else does.
+fn structure(d: &ModelDescription) -> Vec<Defect> {
+    let listed = |k: usize| d.outputs.iter().filter(|u| u.variable == k).count();
+    let of = |line, message| Defect { kind: DefectKind::Structure, line, message };
+    let mut all = Vec::new();
+    for (k, v) in d.variables.iter().enumerate().filter(|(_, v)| !v.alias) {
+        let output = v.causality == Causality::Output;
+        // a clock need not be listed in FMI 3
+        let wanted = output && (d.version == Version::V2 || v.value_type != ValueType::Clock);
+        let message = match (output, listed(k)) {
+            (true, 0) if wanted => "is an output that ModelStructure does not list",
+            (false, 1..) => "is listed as an output in ModelStructure, and is none",
+            (true, 2..) => "is listed more than once as an output in ModelStructure",
+            _ => continue,
+        };
+        all.push(of(Some(v.line), format!("`{}` {message}", printable(&v.name))));
+    }
+    let independent = d.variables.iter().filter(|v| v.causality == Causality::Independent).count();
+    if d.version == Version::V3 && independent != 1 {
+        all.push(of(None, format!("there are {independent} independent variables, where one is wanted")));
+    }
+    all
+}

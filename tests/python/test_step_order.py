@@ -1,0 +1,247 @@
+"""FMUs whose outputs follow their inputs at once are stepped after those that feed them, so that connections delay no value."""
+
+import csv
+import json
+import math
+import zipfile
+
+import pytest
+from cfmu import build
+from conftest import terraglue
+
+# a mass of 1 kg on a spring of 100 N/m, 100 mm off
+MASS = [("f", "input", 0.0, ""), ("x", "output", 0.1, ""), ("v", "output", 0.0, "")]
+SPRING = [("x", "input", 0.1, ""), ("f", "output", -10.0, "")]
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("parts")
+    # exact under a constant force
+    build(folder, "mass", MASS, "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(folder, "spring", SPRING, "r[1] = -100.0 * r[0];", depends="1")
+    return folder
+
+
+def oscillate(parts, folder, more="", step=0.01, isolate=False):
+    """Largest distance in the last period of 2 s, m, and the row of the spring's input in exchange.json."""
+    apart = "isolate = true\n" if isolate else ""
+    (folder / "s.toml").write_text(
+        f"[time]\nstep_s = {step}\nduration_s = 2.0\n"
+        f'[mass]\nfmu = "{parts}/mass.fmu"\n{apart}[a_spring]\nfmu = "{parts}/spring.fmu"\n{apart}'
+        f'[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\n{more}\n[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\n'
+    )
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((folder / "out/variables.csv").open()))
+    late = [abs(float(row["mass.x"])) for row in rows if float(row["t_s"]) > 2.0 - 2 * math.pi / 10]
+    notes = json.loads((folder / "out/exchange.json").read_text())["connections"]
+    return max(late), next(n for n in notes if n["to"] == "a_spring.x"), rows
+
+
+def test_a_spring_is_not_a_step_late(parts, tmp_path):
+    structure, note, rows = oscillate(parts, tmp_path)
+    assert note["delay"] == "0" and "after its source" in note["why"]
+    # the force belongs to the position at every communication point
+    assert all(abs(float(r["a_spring.f"]) + 100 * float(r["mass.x"])) < 1e-12 for r in rows[1:])
+    jacobi, late, _ = oscillate(parts, tmp_path, 'order = "jacobi"')
+    assert late["delay"] == "1"
+    # with a force that is held over the step, energy grows by a share of h k / 2 m per s, with a delay of a step by three of them
+    exact = 0.1
+    assert abs(structure - exact * math.exp(0.25 * 100 * 0.01 * 2)) < 0.08 * exact, structure
+    assert jacobi > 1.8 * structure
+
+
+def test_it_converges_with_the_step(parts, tmp_path):
+    errors = [oscillate(parts, tmp_path, step=h)[0] - 0.1 for h in (0.004, 0.002, 0.001)]
+    assert errors[0] / errors[1] == pytest.approx(2, abs=0.3) and errors[1] / errors[2] == pytest.approx(2, abs=0.3)
+
+
+def test_workers_give_the_same_bits(parts, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    assert oscillate(parts, tmp_path / "a")[2] == oscillate(parts, tmp_path / "b", isolate=True)[2]
+
+
+def test_a_chain_of_gains_is_passed_in_one_step(parts, tmp_path):
+    gain = [("u", "input", 0.0, ""), ("y", "output", 0.0, "")]
+    build(tmp_path, "gain", gain, "r[1] = 2.0 * r[0];", depends="1")
+    build(tmp_path, "clock", [("y", "output", 0.0, "")], "r[0] = t + h;", depends="")
+    # names against the order of the chain
+    names = ["d", "c", "b", "a"]
+    text = "[time]\nstep_s = 0.1\nduration_s = 1.0\n[source]\nfmu = \"clock.fmu\"\n"
+    text += "".join(f'[{n}]\nfmu = "gain.fmu"\n' for n in names)
+    chain = ["source"] + names
+    text += "".join(f'[[connect]]\nfrom = "{x}.y"\nto = "{y}.u"\n' for x, y in zip(chain, names))
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out/variables.csv").open()))
+    assert all(float(r["a.y"]) == pytest.approx(16 * float(r["t_s"]), abs=1e-12) for r in rows)
+
+
+def test_a_loop_of_gains_is_one_step_late(tmp_path):
+    build(tmp_path, "half", [("u", "input", 1.0, ""), ("y", "output", 0.5, "")], "r[1] = 1.0 + 0.5 * r[0];", depends="1")
+    text = "[time]\nstep_s = 0.1\nduration_s = 3.0\n"
+    text += "".join(f'[{n}]\nfmu = "half.fmu"\n' for n in "ab")
+    text += '[[connect]]\nfrom = "a.y"\nto = "b.u"\n[[connect]]\nfrom = "b.y"\nto = "a.u"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--explain", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    notes = json.loads((tmp_path / "out/exchange.json").read_text())
+    assert {n["delay"] for n in notes["connections"]} == {"1"} and len(notes["loops"]) == 1
+
+
+def iterated(parts, folder, step):
+    """Energies over 2 s, and the largest error of the position relative to the amplitude, with the loop of mass and spring solved in
+    each step."""
+    (folder / "s.toml").write_text(
+        f"[time]\nstep_s = {step}\nduration_s = 2.0\n[mass]\nfmu = \"{parts}/mass.fmu\"\n[a_spring]\nfmu = \"{parts}/spring.fmu\"\n"
+        '[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\norder = "iterate"\n'
+        '[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\norder = "iterate"\n'
+    )
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((folder / "out/variables.csv").open()))
+    energies = [0.5 * float(r["mass.v"]) ** 2 + 50 * float(r["mass.x"]) ** 2 for r in rows]
+    errors = [abs(float(r["mass.x"]) - 0.1 * math.cos(10 * float(r["t_s"]))) for r in rows]
+    return energies, max(errors) / 0.1
+
+
+def test_a_loop_that_is_iterated_keeps_the_energy_and_is_of_second_order(parts, tmp_path):
+    energies, error = iterated(parts, tmp_path, 0.01)
+    # the mean of the force at both ends does the work of the spring exactly, so the amplitude stays
+    assert max(energies) - min(energies) < 1e-9 * energies[0]
+    finer = iterated(parts, tmp_path, 0.005)[1]
+    assert error / finer == pytest.approx(4, abs=0.1)
+    notes = json.loads((tmp_path / "out/exchange.json").read_text())["connections"]
+    assert all(n["delay"] == "0" and "repeat" in n["why"] for n in notes)
+
+
+def test_an_algebraic_loop_is_solved(tmp_path):
+    build(tmp_path, "half", [("u", "input", 1.0, ""), ("y", "output", 0.5, "")], "r[1] = 1.0 + 0.5 * r[0];", depends="1")
+    text = "[time]\nstep_s = 0.1\nduration_s = 0.3\n"
+    text += "".join(f'[{n}]\nfmu = "half.fmu"\n' for n in "ab")
+    text += "".join(f'[[connect]]\nfrom = "{x}.y"\nto = "{y}.u"\norder = "iterate"\n' for x, y in ("ab", "ba"))
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out/variables.csv").open()))
+    assert all(float(r["a.y"]) == pytest.approx(2.0, abs=1e-9) for r in rows[1:])
+
+
+def test_a_loop_without_a_solution_says_so(tmp_path):
+    build(tmp_path, "flips", [("u", "input", 1.0, ""), ("y", "output", 0.5, "")], "r[1] = r[0] > 0 ? -1.0 : 1.0;", depends="1")
+    text = '[time]\nstep_s = 0.1\nduration_s = 0.3\n[a]\nfmu = "flips.fmu"\n[[connect]]\nfrom = "a.y"\nto = "a.u"\norder = "iterate"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 1 and "the loop of a was not solved" in done.stderr, done.stderr
+
+
+def test_what_cannot_repeat_a_step_is_refused(tmp_path):
+    fmu = build(tmp_path, "forgets", [("u", "input", 1.0, ""), ("y", "output", 0.5, "")], "r[1] = r[0];", depends="1")
+    entries = {i.filename: zipfile.ZipFile(fmu).read(i) for i in zipfile.ZipFile(fmu).infolist()}
+    entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(b'canGetAndSetFMUstate="true"', b"")
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for name, data in entries.items():
+            archive.writestr(name, data)
+    text = '[time]\nstep_s = 0.1\nduration_s = 0.3\n[a]\nfmu = "forgets.fmu"\n[b]\nfmu = "forgets.fmu"\n[[connect]]\nfrom = "a.y"\nto = "b.u"\norder = "iterate"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 2 and "cannot save its state" in done.stderr and "iterate" in done.stderr, done.stderr
+
+
+def extrapolated(parts, folder, step, more="", extrapolate="linear"):
+    """Largest error of the position in 2 s relative to the amplitude, where the force on the mass follows a line."""
+    (folder / "s.toml").write_text(
+        f"[time]\nstep_s = {step}\nduration_s = 2.0\n[mass]\nfmu = \"{parts}/mass.fmu\"\n[a_spring]\nfmu = \"{parts}/spring.fmu\"\n"
+        f'[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\n{more}\n'
+        f'[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\nextrapolate = "{extrapolate}"\n'
+    )
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((folder / "out/variables.csv").open()))
+    return max(abs(float(r["mass.x"]) - 0.1 * math.cos(10 * float(r["t_s"]))) for r in rows) / 0.1
+
+
+def test_a_line_through_the_last_two_values_is_of_second_order(parts, tmp_path):
+    # where the spring is stepped in order, and where it is late, too: it takes the value at the end of its step then
+    for more in ("", 'order = "jacobi"\nextrapolate = "linear"'):
+        errors = [extrapolated(parts, tmp_path, h, more) for h in (0.004, 0.002, 0.001)]
+        orders = [math.log2(a / b) for a, b in zip(errors, errors[1:])]
+        assert all(order == pytest.approx(2, abs=0.25) for order in orders), errors
+        held = extrapolated(parts, tmp_path, 0.001, extrapolate="constant")
+        assert errors[-1] < 0.03 * held, (errors, held)
+    extrapolated(parts, tmp_path, 0.01)
+    notes = json.loads((tmp_path / "out/exchange.json").read_text())["connections"]
+    assert "line through the last two values" in next(n["why"] for n in notes if n["to"] == "mass.f")
+
+
+RAMP = [("y", "output", 0.0, "")]
+INTEGRATOR = [("u", "input", 0.0, ""), ("x", "output", 0.0, "")]
+
+
+@pytest.mark.parametrize(("source", "target"), [(1, 1), (4, 1), (1, 4), (2, 4)])
+def test_steps_of_different_lengths_meet_on_a_line(tmp_path, source, target):
+    # x is the integral of u = t from the second value of the source on, exactly
+    build(tmp_path, "ramp", RAMP, "r[0] = t + h;", depends="")
+    build(tmp_path, "integrator", INTEGRATOR, "r[1] += h * r[0];", depends="")
+    multiple = lambda n: f"step_multiple = {n}\n" if n > 1 else ""
+    (tmp_path / "s.toml").write_text(
+        f'[time]\nstep_s = 0.1\nduration_s = 4.0\n[ramp]\nfmu = "ramp.fmu"\n{multiple(source)}'
+        f'[sum]\nfmu = "integrator.fmu"\n{multiple(target)}'
+        '[[connect]]\nfrom = "ramp.y"\nto = "sum.u"\nextrapolate = "linear"\n'
+    )
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = [(float(r["t_s"]), float(r["sum.x"])) for r in csv.DictReader((tmp_path / "out/variables.csv").open())]
+    known = 0.1 * max(source, target)
+    for (t, x), (later, more) in zip(rows, rows[1:]):
+        long = abs(t / (0.1 * target) - round(t / (0.1 * target))) < 1e-9
+        if long and t > known + 1e-9:
+            end = t + 0.1 * target
+            at_end = next((x for s, x in rows if abs(s - end) < 1e-9), None)
+            assert at_end is None or at_end - x == pytest.approx(0.5 * (end**2 - t**2), abs=1e-9), (t, x)
+
+
+def test_what_cannot_be_extrapolated_is_refused(parts, tmp_path):
+    (tmp_path / "s.toml").write_text(
+        f'[time]\nduration_s = 0.1\n[mass]\nfmu = "{parts}/mass.fmu"\n[a_spring]\nfmu = "{parts}/spring.fmu"\n'
+        '[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\norder = "iterate"\nextrapolate = "linear"\n'
+    )
+    done = terraglue("run", "s.toml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 2 and "s.toml:11" in done.stderr and "leave one of them out" in done.stderr, done.stderr
+
+
+def test_steps_of_a_minute(tmp_path):
+    build(tmp_path, "slow", RAMP, "r[0] = h;", variable_step=False)
+    with zipfile.ZipFile(tmp_path / "slow.fmu") as archive:
+        entries = {i.filename: archive.read(i) for i in archive.infolist()}
+    entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(
+        b"<ModelVariables>", b'<DefaultExperiment stepSize="60"/><ModelVariables>'
+    )
+    with zipfile.ZipFile(tmp_path / "slow.fmu", "w") as archive:
+        [archive.writestr(name, data) for name, data in entries.items()]
+    scenario = "[time]\nstep_s = {}\nduration_s = 600.0\n[slow]\nfmu = \"slow.fmu\"\n{}"
+    for step, more in ((60, ""), (1, "step_multiple = 60")):
+        (tmp_path / "s.toml").write_text(scenario.format(step, more))
+        done = terraglue("run", "s.toml", "--csv", "--out", "out", cwd=tmp_path)
+        assert done.returncode == 0 and "steps of one length" not in done.stderr, done.stderr
+        rows = list(csv.DictReader((tmp_path / "out/variables.csv").open()))
+        assert float(rows[-1]["slow.y"]) == 60.0
+    (tmp_path / "s.toml").write_text(scenario.format(1, ""))
+    done = terraglue("run", "s.toml", "--out", "out", cwd=tmp_path)
+    assert "`step_multiple = 60`" in done.stderr and "60 s" in done.stderr, done.stderr
+
+
+def test_an_array_of_one_element_and_a_scalar_fit(tmp_path):
+    from cfmu import build_3
+
+    build(tmp_path, "ramp", RAMP, "r[0] = t + h;", depends="")
+    build_3(tmp_path, "one", [("u", "input", "0.0", [1]), ("y", "output", "", [1])], "v[2][0] = v[1][0];")
+    text = '[time]\nstep_s = 0.1\nduration_s = 0.5\n[ramp]\nfmu = "ramp.fmu"\n[one]\nfmu = "one.fmu"\n[last]\nfmu = "last.fmu"\n'
+    build(tmp_path, "last", INTEGRATOR, "r[1] = r[0];", depends="1")
+    text += '[[connect]]\nfrom = "ramp.y"\nto = "one.u"\n[[connect]]\nfrom = "one.y"\nto = "last.u"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr

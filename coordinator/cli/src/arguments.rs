@@ -4,6 +4,7 @@ use crate::locate::arguments::LocateArguments;
 use crate::scenario_arguments::{ScenarioArguments, parse_folder, parse_set};
 use crate::serve_arguments::ServeArguments;
 use crate::shot_arguments::ShotArguments;
+use crate::sweep_arguments::SweepArguments;
 use crate::video_arguments::VideoArguments;
 use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand};
@@ -37,6 +38,8 @@ pub enum Command {
     Run(RunCommand),
     /// Run a scenario with several strategies and soils and put them side by side.
     Compare(CompareArguments),
+    /// Run a scenario many times with values that a plan varies, and put the results into one table and page.
+    Sweep(SweepArguments),
     /// Make the report of a recording again, also of one that was cut off.
     Report {
         /// Folder of the run, e.g. runs/moon_walk.

@@ -222,6 +222,7 @@ fn recorded(
         csv: arguments.csv,
         keeper: None,
         resumed: None,
+        asked: &[],
     };
     let outcome = run::run_testbed(testbed, None, records, &mut progress)?;
     let written = recording::report::write(&plan.folder);

@@ -38,6 +38,8 @@ mod soil_module;
 mod soils;
 mod strict;
 mod structure;
+mod sweep;
+mod sweep_arguments;
 mod table_file;
 mod testbed;
 mod video;
@@ -104,6 +106,7 @@ fn command(command: Command) -> Exit {
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
+        Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Report { folder } => report::report(&folder),
         Command::Serve(arguments) => serve::serve(&arguments),
         Command::Shot(arguments) => shot::shot(&arguments),

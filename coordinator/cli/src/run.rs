@@ -32,6 +32,8 @@ pub struct Outcome {
     pub parts_s: [f64; 3],
     /// What each subsystem cost, s.
     pub costs: Vec<(String, f64)>,
+    /// Values at the end of the variables that were asked for; those that are no numbers are left out.
+    pub asked: Vec<(String, f64)>,
 }
 
 impl Outcome {
@@ -87,7 +89,7 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
         paced = Pace::new(observer, interrupt.flag());
         observer = &mut paced;
     }
-    let records = Records { scenario: &scenario, folder: &folder, csv, keeper, resumed };
+    let records = Records { scenario: &scenario, folder: &folder, csv, keeper, resumed, asked: &[] };
     let outcome = run_testbed(testbed, reloader.as_mut(), records, observer)?;
     drop(progress);
     bar.finish_and_clear();
@@ -181,6 +183,8 @@ pub struct Records<'a> {
     pub keeper: Option<Keeper>,
     /// Where the run stood, if it goes on; the testbed is there already.
     pub resumed: Option<Resumed>,
+    /// Variables whose values at the end are asked for.
+    pub asked: &'a [String],
 }
 
 /// Steps a testbed to the end of its scenario and records it.
@@ -190,7 +194,7 @@ pub fn run_testbed(
     records: Records,
     progress: &mut dyn Observer,
 ) -> Result<Outcome> {
-    let Records { scenario, folder, csv, mut keeper, resumed } = records;
+    let Records { scenario, folder, csv, mut keeper, resumed, asked } = records;
     let goes_on = resumed.is_some();
     let mut clock = RunClock::default();
     let recorder = match resumed {
@@ -230,6 +234,8 @@ pub fn run_testbed(
     let error = error.or(finished.err()).or(timed.err());
     let parts_s = parts_s(&testbed, wall_s);
     let costs = testbed.costs().map(|(name, s)| (name.to_owned(), s)).collect();
+    let value = |name: &String| Some((name.clone(), testbed.read(name)?));
+    let asked = asked.iter().filter_map(value).collect();
     let cancelled = testbed.cancelled();
     let closed = testbed.close();
     set_back(&process_state);
@@ -240,7 +246,7 @@ pub fn run_testbed(
     if summary.status == Status::Done {
         keeper.iter().for_each(Keeper::remove);
     }
-    Ok(Outcome { summary, error, parts_s, costs })
+    Ok(Outcome { summary, error, parts_s, costs, asked })
 }
 
 /// How a run has ended.

@@ -41,6 +41,8 @@ pub enum Form {
     Assignments,
     /// A table of new values by value.
     Map,
+    /// A table of lists or ranges by key path of the scenario.
+    Vary,
 }
 
 impl Key {
@@ -58,6 +60,9 @@ impl Key {
             Form::Texts => "text in quotes or a list of texts".into(),
             Form::Assignments => "a table { \"subsystem.variable\" = value }".into(),
             Form::Map => "a table { \"value\" = new value }".into(),
+            Form::Vary => {
+                "a table { \"key.path\" = [values] } or { \"key.path\" = { from = …, to = … } }".into()
+            }
             _ => allowed(&self.parameter, self.count()),
         }
     }
@@ -91,6 +96,8 @@ const GROUND_COLOURS: &[&str] = &["plain", "height", "sinkage", "slope"];
 pub const CAMERAS: &[&str] = &["follow", "side", "top", "front", "orbit"];
 /// Layers of a page.
 pub const LAYERS: &[&str] = &["forces", "torques", "centre", "support", "overlays", "hits", "ghost", "grid"];
+/// How the points of a sweep are chosen.
+pub const SWEEP_METHODS: &[&str] = &["grid", "latin-hypercube", "sobol", "table"];
 /// Kinds of terrain that come from a file.
 pub const READ: &[&str] = &["esri-ascii", "geotiff", "png"];
 
@@ -104,6 +111,7 @@ pub fn tables() -> Vec<Table> {
         recording(),
         report(),
         page(),
+        sweep(),
         connect(),
         glue(),
         event(),
@@ -335,6 +343,34 @@ fn page() -> Table {
         text("select", "`subsystem.part` or `subsystem.variable` whose properties are shown").into(),
     ];
     of("page", "How the page of a run, its report, pictures and videos look at first.", keys)
+}
+
+fn sweep() -> Table {
+    let whole = |name, help| Parameter::of(name, ParameterType::Integer, help);
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let keys = vec![
+        text("method", "grid: every combination of the values; latin-hypercube and sobol: `points` points spread over the ranges (McKay et al., 1979; Sobol, 1967, scrambled after Owen, 1995); table: the rows of `table`")
+            .or("grid")
+            .choices(SWEEP_METHODS)
+            .into(),
+        whole("points", "of latin-hypercube and sobol: number of points").or(64).within(1.0, 1e6).into(),
+        whole("seeds", "runs of each point, with `world.seed` = `seed`, `seed` + 1, …; 0: one run with the seed of the scenario")
+            .or(0)
+            .within(0.0, 1e6)
+            .into(),
+        whole("seed", "of the points, and first seed of the runs").or(1).within(0.0, 4e9).into(),
+        Parameter::of("table", ParameterType::Path, "of method table: CSV whose titles are key paths, one row a point")
+            .optional()
+            .into(),
+        Key::from(text("collect", "what the table of results has beside the usual figures: keys of `summary.json` (`energies.friction_j`) and variables at the end (`robot.trunk.x`)").optional())
+            .form(Form::Texts),
+        Key::from(
+            Parameter::of("vary", ParameterType::NumberTable, "lists of values, or ranges, by key path as of `--set`: `\"gluing.strategy\" = [\"cooperative\", \"iterative\"]`, `\"terrain.angle_rad\" = { from = 0.0, to = 0.3, count = 7 }`; `log = true`: spread by their logarithm; `count` is of method grid")
+                .optional(),
+        )
+        .form(Form::Vary),
+    ];
+    of("sweep", "Runs that differ in some keys, for `terraglue sweep`.", keys)
 }
 
 fn connect() -> Table {

@@ -9,7 +9,7 @@ use super::node::{Node, Place, Raw};
 use super::section::Section;
 use super::set::{Edit, edit_text};
 use super::source::Source;
-use super::{page, subsystems, terrain};
+use super::{page, subsystems, sweep, terrain};
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_diagnostics::LARGEST_WHOLE;
@@ -98,6 +98,10 @@ impl Scenario {
         })?;
         let report = with_section(&source, "report", |s| read_report(s, &names))?;
         let page = with_section(&source, "page", |s| page::read(s, &names))?;
+        let sweep = match source.root.get("sweep") {
+            Some(_) => Some(with_section(&source, "sweep", sweep::read)?),
+            None => None,
+        };
         let connections = connections(&source, &names)?;
         let glue = glue(&source, &names)?;
         let events = events(&source, &names)?;
@@ -113,6 +117,7 @@ impl Scenario {
             recording,
             report,
             page,
+            sweep,
             subsystems: specs,
             connections,
             glue,
@@ -123,7 +128,7 @@ impl Scenario {
     }
 }
 
-fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
+pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
     let message = format!("cannot read the scenario `{}`: {error}", path.display());
     if error.kind() != std::io::ErrorKind::NotFound {
         let help = "a scenario is a text file in TOML, described in docs/scenario.md".to_owned();
@@ -146,7 +151,12 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
     InputError::plain(message, help)
 }
 
-fn read_source(text: &str, path: &str, sets: &[(String, String)], options: &[&str]) -> Checked<Source> {
+pub(super) fn read_source(
+    text: &str,
+    path: &str,
+    sets: &[(String, String)],
+    options: &[&str],
+) -> Checked<Source> {
     let option = |number: usize| options.get(number).copied().unwrap_or("--set");
     let mut source = Source {
         path: path.into(),
@@ -209,7 +219,11 @@ fn check_top_level(source: &Source) -> Checked<()> {
     Ok(())
 }
 
-fn with_section<T>(source: &Source, name: &str, read: impl FnOnce(&Section) -> Checked<T>) -> Checked<T> {
+pub(super) fn with_section<T>(
+    source: &Source,
+    name: &str,
+    read: impl FnOnce(&Section) -> Checked<T>,
+) -> Checked<T> {
     let empty = || Table { name: "", repeated: false, required: false, help: "", keys: Vec::new() };
     let table = keys::table(name).unwrap_or_else(empty);
     read(&Section::check(source, &table, source.root.get(name))?)

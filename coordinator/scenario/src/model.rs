@@ -36,6 +36,8 @@ pub struct Scenario {
     pub report: ReportSpec,
     /// `[page]`.
     pub page: PageSpec,
+    /// `[sweep]`.
+    pub sweep: Option<SweepSpec>,
     /// Subsystems in the order of their names.
     pub subsystems: Vec<SubsystemSpec>,
     /// `[[connect]]`.
@@ -215,6 +217,52 @@ pub struct ReportSpec {
     pub commanded_speed: Option<String>,
     /// `subsystem.joint` whose torque, velocity and angle are plotted.
     pub joint: Option<String>,
+}
+
+/// `[sweep]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweepSpec {
+    /// How the points are chosen: one of [`super::keys::SWEEP_METHODS`].
+    pub method: String,
+    /// Points of a method that spreads them.
+    pub points: usize,
+    /// Runs of each point with seeds of their own; 0: one with the seed of the scenario.
+    pub seeds: u64,
+    /// Of the points, and the first of the runs.
+    pub seed: u64,
+    /// Rows that are the points.
+    pub table: Option<PathBuf>,
+    /// Keys of `summary.json` and variables beside the usual figures.
+    pub collect: Vec<String>,
+    /// What differs from run to run.
+    pub vary: Vec<VariedKey>,
+}
+
+/// A key path of a scenario with the values that it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VariedKey {
+    /// Key path, as of `--set`.
+    pub key: String,
+    /// Its values.
+    pub values: VariedValues,
+}
+
+/// Values of a key in a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub enum VariedValues {
+    /// These, written as for `--set`.
+    List(Vec<String>),
+    /// A range of numbers.
+    Range {
+        /// Its ends.
+        ends: [f64; 2],
+        /// Whether both are whole numbers, and so all between.
+        is_whole: bool,
+        /// Whether numbers are spread by their logarithm.
+        is_log: bool,
+        /// Numbers on a grid, both ends among them.
+        count: Option<usize>,
+    },
 }
 
 /// `[page]`.

@@ -58,7 +58,7 @@ fn value(key: &Key) -> Value {
         Form::Texts => {
             json!({ "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "string" } }] })
         }
-        Form::Assignments | Form::Map => json!({ "type": "object", "minProperties": 1 }),
+        Form::Assignments | Form::Map | Form::Vary => json!({ "type": "object", "minProperties": 1 }),
         Form::Count(n) => {
             json!({ "type": "array", "items": number(p, "number"), "minItems": n, "maxItems": n })
         }

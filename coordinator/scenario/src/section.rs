@@ -128,6 +128,11 @@ impl<'a> Section<'a> {
         self.source.folder().join(self.text(key))
     }
 
+    /// An error at a place.
+    pub fn error_at(&self, place: &Place, message: String, help: Option<String>) -> Box<InputError> {
+        self.source.error(place, message, help)
+    }
+
     /// An error at the value of a key.
     pub fn error(&self, key: &str, message: String, help: Option<String>) -> Box<InputError> {
         let place = self.entry(key).or(self.node).map(|n| n.at.clone()).unwrap_or_default();
@@ -139,7 +144,7 @@ impl<'a> Section<'a> {
 pub fn check_entry(source: &Source, key: &Key, entry: &Node) -> Checked<()> {
     let ok = match key.form {
         Form::Texts => matches!(&entry.value, Raw::Text(_)) || is_list_of_texts(entry),
-        Form::Assignments | Form::Map => entry.is_table() && !entry.entries().is_empty(),
+        Form::Assignments | Form::Map | Form::Vary => entry.is_table() && !entry.entries().is_empty(),
         _ => {
             let value = entry.to_json();
             let complain = |c: Complaint| source.error(&worst_place(entry), c.message, c.help);

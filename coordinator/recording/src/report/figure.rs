@@ -35,7 +35,7 @@ pub struct Panel {
     /// The choice for which it is shown; none: always.
     pub choice: Option<usize>,
     /// What stands along the axis in place of the time: quantity and unit. The times of the curves are its values then.
-    pub across: Option<(&'static str, &'static str)>,
+    pub across: Option<(String, String)>,
     /// What is drawn in it.
     pub curves: Vec<Curve>,
 }
@@ -147,7 +147,8 @@ impl Figure {
         let mut panels = Vec::new();
         for p in &self.panels {
             let curves: Vec<Value> = p.curves.iter().map(|c| curve(c, p.across.is_none())).collect();
-            let across = p.across.map(|(quantity, unit)| json!({ "quantity": quantity, "unit": unit }));
+            let across =
+                p.across.as_ref().map(|(quantity, unit)| json!({ "quantity": quantity, "unit": unit }));
             panels.push(json!({
                 "quantity": p.quantity, "unit": p.unit, "log": p.log, "choice": p.choice, "x": across, "curves": curves,
             }));

@@ -197,7 +197,7 @@ fn pressure(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
             }
         }
     }
-    let across = Some(("sinkage", "m"));
+    let across = Some(("sinkage".to_owned(), "m".to_owned()));
     let panel = Panel { across, ..Panel::new("mean pressure", "Pa", curves) };
     let note =
         "Mean pressure below each contact over its sinkage, loading and unloading; as the soil tells.".into();

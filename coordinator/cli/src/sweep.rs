@@ -1,0 +1,178 @@
+//! `terraglue sweep`: a list of runs in a folder, and one table of their results.
+
+mod case;
+mod jobs;
+
+use super::output::outln;
+use super::sweep_arguments::{SweepArguments, SweepCommand};
+use super::{Exit, soil_module, testbed};
+use crate::scenario_arguments::ScenarioArguments;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use terraglue_diagnostics::{Error, Result};
+use terraglue_engine::testbed::Testbed;
+use terraglue_scenario::{InputError, Scenario, SweepPlan, did_you_mean};
+use terraglue_sweep::{CASES, Collected, Points, RESULTS, Settings, Sweep, collect, points, write_page};
+
+/// Values of one key that are tried before the list is written; a value that does not fit is found at its case, too.
+const MOST_TRIED: usize = 16;
+
+/// Does what the arguments say.
+pub fn sweep(arguments: &SweepArguments) -> Result<Exit> {
+    match &arguments.command {
+        None => list(arguments),
+        Some(SweepCommand::Run(run)) if run.case.is_some() => case::run(run),
+        Some(SweepCommand::Run(run)) => jobs::run(run),
+        Some(SweepCommand::Collect { folder, json }) => {
+            let all = collected(&Sweep::open(folder)?, *json)?;
+            Ok(if all.missing() == all.rows.len() { Exit::Failed } else { Exit::Done })
+        }
+    }
+}
+
+/// Writes the list of cases.
+fn list(arguments: &SweepArguments) -> Result<Exit> {
+    let (Some(path), Some(out)) = (&arguments.plan, &arguments.out) else {
+        return Err(InputError::plain("sweep: a plan and --out are wanted", None).into());
+    };
+    let (of_plan, sets): (Vec<_>, Vec<_>) =
+        arguments.sets.iter().cloned().partition(|(key, _)| key.starts_with("sweep."));
+    let plan = SweepPlan::load(path, &of_plan)?;
+    let points = points(&plan.spec)?;
+    tried(&plan, &points, &sets, &arguments.module_path)?;
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let settings = Settings {
+        scenario: absolute(&plan.scenario),
+        sets,
+        module_paths: arguments.module_path.iter().map(|path| absolute(path)).collect(),
+        collect: plan.spec.collect.clone(),
+    };
+    let sweep = Sweep::create(out, settings, points)?;
+    let folder = absolute(sweep.folder());
+    let n = sweep.cases.len();
+    if arguments.slurm {
+        outln!("{}", slurm(&folder, n));
+    } else if arguments.commands {
+        (1..=n).for_each(|k| outln!("{}", command(&folder, &k.to_string())));
+    } else {
+        outln!("{n} cases: {}", sweep.folder().join(CASES).display());
+        outln!("run:     terraglue sweep run {}", quoted(sweep.folder()));
+        outln!("collect: terraglue sweep collect {}", quoted(sweep.folder()));
+    }
+    Ok(Exit::Done)
+}
+
+/// The command of a case; `number` may be a word of a script.
+fn command(folder: &Path, number: &str) -> String {
+    let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("terraglue"));
+    format!("{} sweep run {} --case {number} --quiet", quoted(&program), quoted(folder))
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+".contains(c);
+    if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+fn slurm(folder: &Path, cases: usize) -> String {
+    // a directive takes its path as it is, without quotes
+    format!(
+        "#!/bin/sh\n#SBATCH --job-name=terraglue-sweep\n#SBATCH --array=1-{cases}\n#SBATCH --ntasks=1\n#SBATCH --cpus-per-task=1\n#SBATCH --output={}/slurm-%a.out\nexec {}",
+        folder.display(),
+        command(folder, "\"$SLURM_ARRAY_TASK_ID\"")
+    )
+}
+
+/// Finds out, before anything is written, whether the scenario can be built, each of the varied keys is one, and what is to be
+/// collected is there.
+fn tried(plan: &SweepPlan, points: &Points, sets: &[(String, String)], modules: &[PathBuf]) -> Result {
+    let Some(first) = points.rows.first() else { return Ok(()) };
+    let of = |row: &[String]| -> Vec<(String, String)> {
+        sets.iter().cloned().chain(points.keys.iter().cloned().zip(row.iter().cloned())).collect()
+    };
+    let built = |row: &[String]| built(&plan.scenario, &of(row), modules);
+    let testbed = built(first).map_err(|e| of_plan(plan, points, first, e))?;
+    known(&testbed, &plan.spec.collect)?;
+    drop(testbed);
+    for k in 0..points.keys.len() {
+        let mut seen = vec![first[k].as_str()];
+        for row in &points.rows {
+            if seen.len() > MOST_TRIED || seen.contains(&row[k].as_str()) {
+                continue;
+            }
+            seen.push(&row[k]);
+            let mut own = first.clone();
+            own[k].clone_from(&row[k]);
+            if let Err(error) = Scenario::load(&plan.scenario, &of(&own)) {
+                let help = error.help.clone();
+                let message = format!("{} = {}: {}", points.keys[k], row[k], error.message);
+                return Err(plan.error(&points.keys[k], message, help).into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn built(scenario: &Path, sets: &[(String, String)], modules: &[PathBuf]) -> Result<Testbed> {
+    let arguments = ScenarioArguments {
+        scenario: scenario.to_owned(),
+        sets: sets.to_vec(),
+        module_path: modules.to_vec(),
+    };
+    let loaded = Scenario::load(scenario, sets)?;
+    soil_module::check(&loaded, &arguments)?;
+    testbed::build(&loaded, &testbed::options_of(1, modules, &Arc::new(AtomicBool::new(false))))
+}
+
+/// An error of the first case, at the key whose edit it is about.
+fn of_plan(plan: &SweepPlan, points: &Points, first: &[String], error: Error) -> Error {
+    let Error::Input(input) = &error else { return error };
+    let text = input.source_code.inner();
+    let about = points.keys.iter().zip(first).find(|(key, value)| *text == format!("{key}={value}"));
+    match about {
+        Some((key, value)) => {
+            plan.error(key, format!("{key} = {value}: {}", input.message), input.help.clone()).into()
+        }
+        None => error,
+    }
+}
+
+/// Variables that are collected must be there; keys of the summary are known when there is one.
+fn known(testbed: &Testbed, names: &[String]) -> Result {
+    let variables = testbed.signals().directory.names();
+    let subsystems: Vec<&str> = variables.iter().filter_map(|name| Some(name.split_once('.')?.0)).collect();
+    for name in names {
+        let of_subsystem = name.split_once('.').is_some_and(|(subsystem, _)| subsystems.contains(&subsystem));
+        if of_subsystem && testbed.read(name).is_none() {
+            let help = did_you_mean(name, variables.iter().map(String::as_str));
+            let message = format!("sweep.collect: there is no variable `{name}` that is a number");
+            return Err(InputError::plain(message, help).into());
+        }
+    }
+    Ok(())
+}
+
+/// Writes table and page of what is there, and says so.
+fn collected(sweep: &Sweep, json: bool) -> Result<Collected> {
+    let all = collect(sweep)?;
+    let page = write_page(sweep, &all)?;
+    let counts =
+        ["done", "failed", "refused", "crashed", "missing"].map(|status| (status, all.count(status)));
+    let table = sweep.folder().join(RESULTS);
+    if json {
+        let mut value: serde_json::Map<String, serde_json::Value> =
+            counts.iter().map(|(status, n)| ((*status).to_owned(), (*n).into())).collect();
+        value.insert("table".into(), table.display().to_string().into());
+        value.insert("page".into(), page.display().to_string().into());
+        outln!("{}", serde_json::Value::Object(value));
+    } else {
+        let counts: Vec<String> =
+            counts.iter().filter(|(_, n)| *n > 0).map(|(status, n)| format!("{n} {status}")).collect();
+        outln!("cases: {}", counts.join(", "));
+        outln!("table: {}", table.display());
+        outln!("page:  {}", page.display());
+    }
+    Ok(all)
+}

@@ -1,0 +1,270 @@
+//! `[sweep]`: which keys of a scenario differ from run to run, in the scenario itself or in a plan of its own that names the scenario.
+
+use super::load::{read_source, unreadable, with_section};
+use super::model::{Scenario, SweepSpec, VariedKey, VariedValues};
+use super::node::{Node, Place, Raw};
+use super::section::{Section, must_exist};
+use super::source::Source;
+use super::subsystems::texts;
+use std::path::{Path, PathBuf};
+use terraglue_diagnostics::{InputError, did_you_mean};
+
+type Checked<T> = Result<T, Box<InputError>>;
+
+/// A sweep with the scenario that it is of.
+#[derive(Clone, Debug)]
+pub struct SweepPlan {
+    /// File of the scenario.
+    pub scenario: PathBuf,
+    /// What differs from run to run.
+    pub spec: SweepSpec,
+    source: Source,
+}
+
+impl SweepPlan {
+    /// Reads a scenario with `[sweep]`, or a plan of its own: `scenario = "file.toml"` and `[sweep]`. `sets` edit it first.
+    ///
+    /// # Errors
+    /// Wrong input, with the place in the file or in the edit.
+    pub fn load(path: &Path, sets: &[(String, String)]) -> Checked<Self> {
+        let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
+        let source = read_source(&text, &path.display().to_string(), sets, &[])?;
+        let scenario = match source.root.get("scenario") {
+            Some(node) => named(&source, node)?,
+            None => path.to_owned(),
+        };
+        if source.root.get("sweep").is_none() {
+            let help = "[sweep] with [sweep.vary], described in docs/sweep.md, says which keys differ from run to run";
+            return Err(source.error(
+                &Place::default(),
+                "there is no table `[sweep]` here",
+                Some(help.into()),
+            ));
+        }
+        let spec = match scenario == path {
+            true => Scenario::load(path, sets)?.sweep,
+            false => Some(with_section(&source, "sweep", read)?),
+        };
+        let Some(spec) = spec else { return Err(InputError::plain("there is no table `[sweep]`", None)) };
+        Ok(Self { scenario, spec, source })
+    }
+
+    /// An error at a varied key, with its place in the file.
+    pub fn error(&self, key: &str, message: String, help: Option<String>) -> Box<InputError> {
+        self.source.error_at_value(&["sweep", "vary", key], message, help)
+    }
+}
+
+/// The scenario of a plan of its own, which holds nothing else but `[sweep]`.
+fn named(source: &Source, node: &Node) -> Checked<PathBuf> {
+    let Raw::Text(text) = &node.value else {
+        return Err(source.error(&node.at, "`scenario` is the name of a file, in quotes", None));
+    };
+    must_exist(source, text).map_err(|c| source.error(&node.at, c.message, c.help))?;
+    for (key, other) in source.root.entries() {
+        if !["scenario", "sweep"].contains(&key.as_str()) {
+            let help = "a plan has `scenario` and `[sweep]`; all else stands in the scenario";
+            return Err(source.error(
+                &other.key,
+                format!("unknown key `{key}` in a plan"),
+                Some(help.into()),
+            ));
+        }
+    }
+    Ok(source.folder().join(text))
+}
+
+/// Reads the table.
+pub fn read(s: &Section) -> Checked<SweepSpec> {
+    let spec = SweepSpec {
+        method: s.text("method"),
+        points: usize::try_from(s.count("points")).unwrap_or(usize::MAX),
+        seeds: s.count("seeds"),
+        seed: s.count("seed"),
+        table: s.entry("table").map(|_| s.file("table")),
+        collect: s.entry("collect").map(texts).unwrap_or_default(),
+        vary: s.entry("vary").map(|node| varied(s, node)).transpose()?.unwrap_or_default(),
+    };
+    let refuse = |key: &str, message: &str, help: &str| Err(s.error(key, message.into(), Some(help.into())));
+    match (spec.method.as_str(), &spec.table) {
+        ("table", None) => {
+            return refuse("method", "the method `table` needs a table", "give `table = \"points.csv\"`");
+        }
+        ("table", Some(_)) if !spec.vary.is_empty() => {
+            return refuse(
+                "vary",
+                "the points of the method `table` are the rows of its table",
+                "leave `vary` out",
+            );
+        }
+        ("grid" | "latin-hypercube" | "sobol", Some(_)) => {
+            return refuse("table", "`table` is of the method `table`", "write `method = \"table\"`");
+        }
+        ("latin-hypercube" | "sobol", None) if spec.vary.is_empty() => {
+            return refuse("method", "there is nothing to spread points over", "give `[sweep.vary]`");
+        }
+        ("grid", None) if spec.vary.is_empty() && spec.seeds == 0 => {
+            return refuse(
+                "method",
+                "nothing differs from run to run",
+                "give `[sweep.vary]`, or `seeds` of several runs",
+            );
+        }
+        _ => {}
+    }
+    if spec.method == "grid" && s.entry("points").is_some() {
+        return refuse(
+            "points",
+            "`points` is of latin-hypercube and sobol",
+            "a grid has `count` in its ranges",
+        );
+    }
+    Ok(spec)
+}
+
+fn varied(s: &Section, node: &Node) -> Checked<Vec<VariedKey>> {
+    let is_grid = s.text("method") == "grid";
+    let one = |(key, entry): &(String, Node)| {
+        let at = |message: String, help: &str| s.error_at(&entry.at, message, Some(help.to_owned()));
+        if key == "world.seed" && s.count("seeds") > 0 {
+            return Err(at("`world.seed` is that of `seeds`".into(), "leave one of both out"));
+        }
+        let values = match &entry.value {
+            Raw::List(items) if !items.is_empty() => {
+                let all = items.iter().map(written).collect::<Option<Vec<String>>>();
+                all.map(VariedValues::List).ok_or_else(|| {
+                    at(
+                        format!("`{key}` has a value that no `--set` can give"),
+                        "values are numbers, texts, truth values, or lists of them",
+                    )
+                })?
+            }
+            Raw::Table(_) => range(s, key, entry, is_grid)?,
+            _ => {
+                let help = "write [a, b, c], or { from = a, to = b } for a range";
+                return Err(at(format!("`{key}` takes a list of values or a range"), help));
+            }
+        };
+        Ok(VariedKey { key: key.clone(), values })
+    };
+    node.entries().iter().map(one).collect()
+}
+
+/// Keys of a range.
+const RANGE: [&str; 4] = ["from", "to", "count", "log"];
+
+fn range(s: &Section, key: &str, entry: &Node, is_grid: bool) -> Checked<VariedValues> {
+    let at = |node: &Node, message: String, help: Option<String>| Err(s.error_at(&node.at, message, help));
+    if let Some((name, node)) = entry.entries().iter().find(|(name, _)| !RANGE.contains(&name.as_str())) {
+        // a key path without quotes is read as tables in tables
+        let help = did_you_mean(name, RANGE)
+            .unwrap_or_else(|| format!("a path is written in quotes: \"{key}.{name}\" = [1, 2]"));
+        return at(node, format!("a range has no key `{name}`"), Some(help));
+    }
+    let ends = ["from", "to"].map(|name| entry.get(name).and_then(|node| node.to_json().as_f64()));
+    let [Some(from), Some(to)] = ends else {
+        return at(
+            entry,
+            format!("`{key}` lacks `from` or `to`"),
+            Some("write { from = 0.0, to = 1.0 }".into()),
+        );
+    };
+    let is_log = entry.get("log").is_some_and(|node| node.to_json() == true);
+    if from >= to || (is_log && from <= 0.0) {
+        let help = if is_log { "0 < from < to" } else { "from < to" };
+        return at(entry, format!("`{key}` has no range from {from} to {to}"), Some(help.into()));
+    }
+    let count = entry.get("count").map(|node| (node, node.to_json().as_u64()));
+    let count = match count {
+        Some((node, _)) if !is_grid => {
+            return at(
+                node,
+                "`count` is of the method `grid`".into(),
+                Some("`points` says how many there are".into()),
+            );
+        }
+        Some((_, Some(n @ 2..=1_000_000))) => Some(n as usize),
+        Some((node, _)) => {
+            return at(node, format!("`{key}` takes a `count` of 2 or more"), None);
+        }
+        None if is_grid => {
+            return at(
+                entry,
+                format!("the range of `{key}` has no `count`"),
+                Some("a grid needs the number of its values: { from = 0.0, to = 1.0, count = 5 }".into()),
+            );
+        }
+        None => None,
+    };
+    let whole = |name: &str| entry.get(name).is_some_and(|node| matches!(node.value, Raw::Integer(_)));
+    Ok(VariedValues::Range { ends: [from, to], is_whole: whole("from") && whole("to"), is_log, count })
+}
+
+/// A value as `--set` takes it: a text without quotes where it cannot be read as anything else.
+fn written(node: &Node) -> Option<String> {
+    Some(match &node.value {
+        Raw::Text(text) => {
+            let is_plain = text.parse::<toml_edit::Value>().is_err()
+                && text.trim() == text
+                && !text.is_empty()
+                && !text.contains(char::is_control);
+            if is_plain { text.clone() } else { toml_edit::Value::from(text.as_str()).to_string() }
+        }
+        Raw::Bool(value) => value.to_string(),
+        Raw::Integer(value) => value.to_string(),
+        Raw::Number(value) => format!("{value:?}"),
+        Raw::List(items) => {
+            let quoted = |item: &Node| match &item.value {
+                Raw::Text(text) => Some(toml_edit::Value::from(text.as_str()).to_string()),
+                _ => written(item),
+            };
+            format!("[{}]", items.iter().map(quoted).collect::<Option<Vec<_>>>()?.join(", "))
+        }
+        Raw::Table(_) => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(text: &str) -> Checked<SweepSpec> {
+        let source = read_source(text, "plan.toml", &[], &[])?;
+        with_section(&source, "sweep", read)
+    }
+
+    #[test]
+    fn values_are_written_as_for_an_edit() {
+        let spec = plan(
+            "[sweep.vary]\n\"a.b\" = [1, 2.5, true, \"x y\", \"3\", [\"p\", \"q\"]]\nc = { from = 1, to = 9, count = 3 }",
+        );
+        let spec = spec.expect("read");
+        let VariedValues::List(values) = &spec.vary[0].values else { panic!("a list") };
+        assert_eq!(values, &["1", "2.5", "true", "x y", "\"3\"", "[\"p\", \"q\"]"]);
+        assert_eq!(
+            spec.vary[1].values,
+            VariedValues::Range { ends: [1.0, 9.0], is_whole: true, is_log: false, count: Some(3) }
+        );
+    }
+
+    #[test]
+    fn what_is_no_sweep_is_refused_with_the_way_out() {
+        let cases = [
+            ("[sweep]\n", "nothing differs"),
+            ("[sweep]\nmethod = \"sobol\"\n", "nothing to spread"),
+            ("[sweep]\nmethod = \"table\"\n", "needs a table"),
+            ("[sweep]\npoints = 3\n[sweep.vary]\na = [1]\n", "is of latin-hypercube"),
+            ("[sweep.vary]\na = 1\n", "takes a list"),
+            ("[sweep.vary]\na.b = [1]\n", "has no key `b`"),
+            ("[sweep.vary]\na = { from = 0.0, to = 1.0 }\n", "has no `count`"),
+            ("[sweep.vary]\na = { from = 1.0, to = 1.0, count = 2 }\n", "has no range"),
+            ("[sweep.vary]\na = { from = 0.0, to = 1.0, count = 2, log = true }\n", "has no range"),
+            ("[sweep]\nseeds = 2\n[sweep.vary]\n\"world.seed\" = [1]\n", "`world.seed` is that of `seeds`"),
+        ];
+        for (text, words) in cases {
+            let error = plan(text).expect_err(text);
+            assert!(error.message.contains(words), "{text}: {}", error.message);
+            assert!(error.help.is_some(), "{text}");
+        }
+    }
+}

@@ -6,7 +6,7 @@ import math
 import zipfile
 
 import pytest
-from cfmu import build
+from cfmu import build, build_3
 from conftest import terraglue
 
 # a mass of 1 kg on a spring of 100 N/m, 100 mm off
@@ -130,6 +130,22 @@ def test_an_algebraic_loop_is_solved(tmp_path):
     assert all(float(r["a.y"]) == pytest.approx(2.0, abs=1e-9) for r in rows[1:])
 
 
+def test_a_loop_with_gains_above_one_is_solved(tmp_path):
+    # y = 1 - 3 u_1 + u_2 and y = 2 + 4 u_1 - u_2: repeating alone runs away
+    reals = [("u_1", "input", 0.0, ""), ("u_2", "input", 0.0, ""), ("y", "output", 0.0, "")]
+    build(tmp_path, "one", reals, "r[2] = 1.0 - 3.0 * r[0] + r[1];", depends="1 2")
+    build(tmp_path, "two", reals, "r[2] = 2.0 + 4.0 * r[0] - r[1];", depends="1 2")
+    text = '[time]\nstep_s = 0.1\nduration_s = 0.3\n[one]\nfmu = "one.fmu"\n[two]\nfmu = "two.fmu"\n'
+    for target in ("one", "two"):
+        text += f'[[connect]]\nfrom = "one.y"\nto = "{target}.u_1"\norder = "iterate"\n[[connect]]\nfrom = "two.y"\nto = "{target}.u_2"\norder = "iterate"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    # 4 a - b = 1, -4 a + 2 b = 2
+    last = list(csv.DictReader((tmp_path / "out/variables.csv").open()))[-1]
+    assert float(last["one.y"]) == pytest.approx(1.0, abs=1e-8) and float(last["two.y"]) == pytest.approx(3.0, abs=1e-8)
+
+
 def test_a_loop_without_a_solution_says_so(tmp_path):
     build(tmp_path, "flips", [("u", "input", 1.0, ""), ("y", "output", 0.5, "")], "r[1] = r[0] > 0 ? -1.0 : 1.0;", depends="1")
     text = '[time]\nstep_s = 0.1\nduration_s = 0.3\n[a]\nfmu = "flips.fmu"\n[[connect]]\nfrom = "a.y"\nto = "a.u"\norder = "iterate"\n'
@@ -245,3 +261,47 @@ def test_an_array_of_one_element_and_a_scalar_fit(tmp_path):
     (tmp_path / "s.toml").write_text(text)
     done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def squares(folder, version, knows=True):
+    """A source with y = t² that tells its derivative, and a sum that holds its input over a step."""
+    build(folder, "integrator", INTEGRATOR, "r[1] += h * r[0];", depends="")
+    flags = 'maxOutputDerivativeOrder="1"' if knows else ""
+    if version == 2:
+        more = "int fmi2GetRealOutputDerivatives(Fmu *u, const unsigned *r, size_t n, const int *o, double *x)"
+        more += "{ while (n--) x[n] = o[n] == 1 ? 2 * sqrt(u->r[r[n]]) : 0; return 0; }"
+        build(folder, "square", [("y", "output", 0.0, "")], "r[0] = (t + h) * (t + h);", more=more, flags=flags, depends="")
+    else:
+        more = "int fmi3GetOutputDerivatives(Fmu *u, const unsigned *r, size_t n, const int *o, double *x, size_t m)"
+        more += "{ while (n--) x[n] = o[n] == 1 ? 2 * sqrt(u->v[r[n]][0]) : 0; return 0; }"
+        build_3(folder, "square", [("y", "output", None, [])], "v[1][0] = (t + h) * (t + h);", more=more, flags=flags)
+
+
+def summed(folder, extrapolate, step=0.1, more=""):
+    (folder / "s.toml").write_text(
+        f'[time]\nstep_s = {step}\nduration_s = 4.0\n[square]\nfmu = "square.fmu"\n{more}\n[sum]\nfmu = "integrator.fmu"\n'
+        f'[[connect]]\nfrom = "square.y"\nto = "sum.u"\nfactor = 3.0\nextrapolate = "{extrapolate}"\n'
+    )
+    return terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_input_follows_the_derivative_that_an_fmu_tells(tmp_path, version):
+    squares(tmp_path, version)
+    for step in (0.1, 0.05):
+        done = summed(tmp_path, "derivatives", step)
+        assert done.returncode == 0, done.stderr
+        last = list(csv.DictReader((tmp_path / "out/variables.csv").open()))[-1]
+        # of the integral of 3 t² over each step, t² and 2 t are met and h² is not
+        assert float(last["sum.x"]) == pytest.approx(64 - 4 * step**2, abs=1e-9)
+    notes = json.loads((tmp_path / "out/exchange.json").read_text())["connections"]
+    assert "derivative that its source tells" in notes[0]["why"]
+
+
+def test_a_source_without_derivatives_is_refused(tmp_path):
+    squares(tmp_path, 2, knows=False)
+    done = summed(tmp_path, "derivatives")
+    assert done.returncode == 2 and "maxOutputDerivativeOrder" in done.stderr and "linear" in done.stderr, done.stderr
+    squares(tmp_path, 2)
+    done = summed(tmp_path, "derivatives", more="isolate = true")
+    assert done.returncode == 2 and "isolated" in done.stderr, done.stderr

@@ -330,3 +330,38 @@ def test_derivatives_of_a_turning_body_are_its_jacobian(tmp_path):
     q, p = (np.array([told["none"][0][-1][f"a.{n}[{k + 1}]"] for k in range(c)]) for n, c in (("q", 4), ("p", 3)))
     assert np.abs(p + turn(q) @ [0.4, 0.3, 0.2] - [0.4, 0.3, 0.2]).max() < 1e-11
     assert abs(q[0]) < 0.95
+
+
+def apart(folder, more, arm=None):
+    """A pair glued by the link that hangs on its joint to an arm that stands 5 cm off; places at the start and after a tenth of a second."""
+    (folder / "pair.urdf").write_text(robot(link("hull", HULL), link("arm", ARM), joint("hull", "arm", np.subtract(JOINT, HULL_AT))))
+    (folder / "arm.urdf").write_text(robot(link("arm", ARM)))
+    off = arm or np.add(ARM_AT, [0.03, 0.0, 0.04]).tolist()
+    (folder / "s.toml").write_text(
+        "[time]\nstep_s = 0.001\nduration_s = 0.1\n[world]\ngravity_m_s2 = [0.0, 0.0, 0.0]\n"
+        f'[pair]\nmodule = "rigid-body"\nmodel = "pair.urdf"\nmotor = "off"\nposition_m = {HULL_AT}\n'
+        f'[other]\nmodule = "rigid-body"\nmodel = "arm.urdf"\nmotor = "off"\nposition_m = {off}\n'
+        f'[gluing]\nstrategy = "iterative"\n[[glue]]\nside_1 = "pair.arm"\nside_2 = "other.arm"\ncomponents = ["x", "y", "z"]\n{more}'
+    )
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
+    rows = list(csv.DictReader((folder / "out/variables.csv").open())) if done.returncode == 0 else []
+    place = lambda row, body: np.array([float(row[f"{body}.{axis}"]) for axis in "xyz"])
+    return done, [{body: place(row, body) for body in ("pair.hull", "pair.arm", "other.arm")} for row in rows]
+
+
+def test_a_gap_is_closed_by_moving_the_free_body_that_the_glued_one_hangs_on(tmp_path):
+    done, _ = apart(tmp_path, "")
+    assert done.returncode == 2 and "0.0500 m apart" in done.stderr and "close" in done.stderr, done.stderr
+    done, rows = apart(tmp_path, 'close = "project"\n')
+    assert done.returncode == 0, done.stderr
+    # the pair has moved as a whole, nothing has been accelerated by it
+    assert rows[0]["pair.hull"] == pytest.approx(np.add(HULL_AT, [0.03, 0.0, 0.04]), abs=1e-9)
+    for row in (rows[0], rows[-1]):
+        assert row["pair.arm"] == pytest.approx(row["other.arm"], abs=1e-9)
+    assert rows[-1]["pair.hull"] == pytest.approx(rows[0]["pair.hull"], abs=1e-9)
+    # no gap, no way
+    done, rows = apart(tmp_path, 'close = "project"\n', ARM_AT)
+    assert rows[0]["pair.hull"] == pytest.approx(HULL_AT, abs=1e-12)
+    for more in ('ramp_s = 0.5\nclose = "project"\n', 'close = "proyect"\n'):
+        done, _ = apart(tmp_path, more)
+        assert done.returncode == 2 and "close" in done.stderr, done.stderr

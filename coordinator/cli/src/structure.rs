@@ -10,7 +10,9 @@ use terraglue_fmi::export::{Compression, Content, pack};
 use terraglue_fmi::ssp::{self, NewComponent, NewConnection};
 use terraglue_fmi::{Fmu, ModelDescription};
 use terraglue_fmu::start_values;
-use terraglue_scenario::{Connection, ConnectionOrder, InputError, ModuleKind, Scenario, SubsystemSpec};
+use terraglue_scenario::{
+    Connection, ConnectionOrder, Extrapolate, InputError, ModuleKind, Scenario, SubsystemSpec,
+};
 use terraglue_subsystem::ValueType;
 
 /// Writes the archive.
@@ -72,7 +74,8 @@ fn notes(scenario: &Scenario) {
     for spec in scenario.subsystems.iter().filter(|s| s.step_multiple > 1) {
         eprintln!("note: `step_multiple` of `{}` is left out", spec.name);
     }
-    let ordered = |c: &&Connection| c.order != ConnectionOrder::Structure || c.extrapolate;
+    let ordered =
+        |c: &&Connection| c.order != ConnectionOrder::Structure || c.extrapolate != Extrapolate::Constant;
     if scenario.connections.iter().any(|c| ordered(&c)) {
         eprintln!("note: `order` and `extrapolate` of connections are left out");
     }

@@ -18,6 +18,7 @@ use terraglue_subsystem::Energy;
 
 mod build;
 mod checks;
+mod declared_glue;
 mod explain;
 mod glued;
 mod group;

@@ -417,7 +417,9 @@ impl Subsystem for FmuSubsystem {
                 true => Capabilities::DERIVATIVES,
                 false => Capabilities::default(),
             };
-        retry | bytes | force | through | of_step | fixed | derivatives
+        let slopes =
+            if c.output_derivatives { Capabilities::OUTPUT_DERIVATIVES } else { Capabilities::default() };
+        retry | bytes | force | through | of_step | fixed | derivatives | slopes
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
@@ -522,6 +524,14 @@ impl Subsystem for FmuSubsystem {
             return Err(Error::Unsupported);
         }
         self.instance.directional_derivative(&z, &v, seed, out).map_err(error)
+    }
+
+    fn output_derivatives(&self, ids: &[u32], out: &mut [f64]) -> Result {
+        let mut references = Vec::new();
+        if !self.collect(ids, &mut references)? {
+            return Err(Error::Unsupported);
+        }
+        self.instance.output_derivatives(&references, out).map_err(error)
     }
 
     fn variables(&self) -> &[Variable] {

@@ -15,6 +15,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub mod acceleration;
 mod complementarity;
 mod component;
 mod conditions;

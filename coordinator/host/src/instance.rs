@@ -461,6 +461,29 @@ impl Instance {
         }
     }
 
+    /// Derivatives of outputs by time, per second; false: they are not known.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or told NaN.
+    pub fn output_derivatives(&self, ids: &[u32], out: &mut [f64]) -> Result<bool> {
+        const NAME: &str = "output_derivatives";
+        self.supervision.alive(NAME)?;
+        if self.elements().is_some_and(|e| ids.iter().any(|id| e.has(*id))) {
+            return Ok(false);
+        }
+        out.fill(f64::NAN);
+        match self.subsystem.output_derivatives(ids, out) {
+            Err(Failure::Unsupported) => Ok(false),
+            result => {
+                self.supervision.outcome(NAME, result)?;
+                match out.iter().all(|x| x.is_finite()) {
+                    true => Ok(true),
+                    false => Err(self.error(NAME, "a derivative is no number".to_owned())),
+                }
+            }
+        }
+    }
+
     /// All actions.
     pub fn actions(&self) -> &[Action] {
         self.subsystem.actions()

@@ -3,8 +3,8 @@
 use super::choices::StrategyKind;
 use super::keys::{self, Table};
 use super::model::{
-    Comparison, Connection, ConnectionOrder, Entry, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec,
-    Trigger,
+    Comparison, Connection, ConnectionOrder, Entry, EventSpec, Extrapolate, FaultEnd, FaultKind, FaultSpec,
+    GlueSpec, Trigger,
 };
 use super::node::{Node, Raw};
 use super::section::Section;
@@ -26,10 +26,17 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             let message = format!("`to` has {stars_to} `*`, `from` only {stars_from} to fill them");
             return Err(s.error("to", message, None));
         }
-        let extrapolate = s.text("extrapolate") == "linear";
-        if extrapolate && s.text("order") == "iterate" {
-            let message = "`extrapolate = \"linear\"` beside `order = \"iterate\"`, which finds the values of the step itself";
-            return Err(s.error("extrapolate", message.into(), Some("leave one of them out".into())));
+        let extrapolate = match s.text("extrapolate").as_str() {
+            "linear" => Extrapolate::Linear,
+            "derivatives" => Extrapolate::Derivatives,
+            _ => Extrapolate::Constant,
+        };
+        if extrapolate != Extrapolate::Constant && s.text("order") == "iterate" {
+            let message = format!(
+                "`extrapolate = \"{}\"` beside `order = \"iterate\"`, which finds the values of the step itself",
+                s.text("extrapolate")
+            );
+            return Err(s.error("extrapolate", message, Some("leave one of them out".into())));
         }
         Ok(Connection {
             extrapolate,
@@ -84,6 +91,16 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             let message = "`ramp_s` is of joints without compliance".into();
             return Err(s.error("ramp_s", message, Some("leave it out".into())));
         }
+        let projects = s.text("close") == "project";
+        if projects
+            && (contact
+                || s.number("compliance_m_n") > 0.0
+                || s.number("ramp_s") > 0.0
+                || s.entry("at_m").is_some())
+        {
+            let message = "`close = \"project\"` is of joints without compliance, ramp and `at_m`".into();
+            return Err(s.error("close", message, Some("leave it out".into())));
+        }
         let normal: [f64; 3] = s.numbers("normal");
         if contact && normal.iter().map(|n| n * n).sum::<f64>() < 1e-12 {
             let message = "a normal of no length points nowhere".into();
@@ -108,6 +125,7 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             compliance: s.number("compliance_m_n"),
             damping: s.number("damping_n_s_m"),
             ramp_s: s.number("ramp_s"),
+            projects,
             t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),
             mu,
             strategy: s.optional_text("strategy").and_then(|name| StrategyKind::named(&name)),

@@ -387,9 +387,9 @@ fn connect() -> Table {
             .or("structure")
             .choices(&["structure", "jacobi", "iterate"])
             .into(),
-        text("extrapolate", "where the input is read at the start of a step: constant: held as it was read; linear: it follows the line through the last two values, with the mean over the step of the target, or the value at its end where outputs follow inputs at once")
+        text("extrapolate", "where the input is read at the start of a step: constant: held as it was read; linear: it follows the line through the last two values, with the mean over the step of the target, or the value at its end where outputs follow inputs at once; derivatives: the same along the derivative of the output that an FMU tells (`maxOutputDerivativeOrder`)")
             .or("constant")
-            .choices(&["constant", "linear"])
+            .choices(&["constant", "linear", "derivatives"])
             .into(),
         Key::from(
             Parameter::of(
@@ -443,6 +443,10 @@ fn glue() -> Table {
             .into(),
         number("ramp_s", "s", 0.0, "time in which a joint without compliance closes the gap between its points at the start; 0: there may be none")
             .within(0.0, f64::INFINITY)
+            .into(),
+        text("close", "what becomes of a gap between the points of a joint at the start: refuse; project: the free body of side 1, or else of side 2, is moved there with all that hangs on it")
+            .or("refuse")
+            .choices(&["refuse", "project"])
             .into(),
         text("strategy", "how all that is connected with this glue is glued; `gluing.strategy` where absent")
             .optional()

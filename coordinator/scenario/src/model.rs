@@ -380,12 +380,24 @@ pub struct Connection {
     pub convert: bool,
     /// When within a step its value is passed.
     pub order: ConnectionOrder,
-    /// Whether the input follows the line through the last two values; else it is held.
-    pub extrapolate: bool,
+    /// What the input follows where it is read at the start of a step.
+    pub extrapolate: Extrapolate,
     /// What each value becomes, of truth values, whole numbers and enumerations; empty: what it is.
     pub map: Vec<(String, Value)>,
     /// Where it stands.
     pub entry: Entry,
+}
+
+/// What an input follows over a step that begins with the output that feeds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Extrapolate {
+    /// It is held.
+    #[default]
+    Constant,
+    /// The line through the last two values.
+    Linear,
+    /// The line along the derivative that the source tells.
+    Derivatives,
 }
 
 impl Default for GluingSpec {
@@ -430,6 +442,8 @@ pub struct GlueSpec {
     pub damping: f64,
     /// Time in which the gap at the start is closed, s; 0: there may be none.
     pub ramp_s: f64,
+    /// Whether a free body is moved so that the points of a joint meet at the start.
+    pub projects: bool,
     /// Largest normal force, N.
     pub t_max: f64,
     /// Coulomb coefficient.

@@ -10,6 +10,8 @@ use terraglue_scenario::{SweepSpec, VariedKey, VariedValues};
 const MOST: usize = 1_000_000;
 /// Most keys that the direction numbers of the sequence of Sobol reach for.
 const MOST_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
+/// Most points of that sequence.
+const MOST_OF_SOBOL: usize = 1 << 16;
 /// The key of the seeds of the runs.
 const SEED: &str = "world.seed";
 
@@ -99,10 +101,9 @@ fn latin_hypercube(spec: &SweepSpec) -> Vec<Vec<String>> {
 
 /// The sequence of Sobol (1967), scrambled after Owen (1995).
 fn sobol(spec: &SweepSpec) -> Result<Vec<Vec<String>>, Box<InputError>> {
-    let most_points = sobol_burley::MAX_SAMPLES as usize;
-    if spec.vary.len() > MOST_DIMENSIONS || spec.points > most_points {
+    if spec.vary.len() > MOST_DIMENSIONS || spec.points > MOST_OF_SOBOL {
         let message =
-            format!("the method sobol spreads {most_points} points over {MOST_DIMENSIONS} keys at most");
+            format!("the method sobol spreads {MOST_OF_SOBOL} points over {MOST_DIMENSIONS} keys at most");
         return Err(InputError::plain(message, Some("write `method = \"latin-hypercube\"`".into())));
     }
     let seed = (mixed(spec.seed) >> 32) as u32;

@@ -35,6 +35,9 @@ impl Capabilities {
     /// committed. Of FMUs; unknown to the C interface of modules.
     pub const STEP_FEEDTHROUGH: Self = Self(1 << 31);
 
+    /// `output_derivatives` is implemented. Of FMUs in this process; unknown to the C interface of modules.
+    pub const OUTPUT_DERIVATIVES: Self = Self(1 << 30);
+
     /// All names, for messages and listings.
     pub const NAMES: [(Self, &'static str); 13] = [
         (Self::FORCE, "force input"),

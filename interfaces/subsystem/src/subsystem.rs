@@ -184,6 +184,15 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
+    /// Derivatives of f64 outputs by time at the committed time, per second. Asked of an instance with
+    /// [`Capabilities::OUTPUT_DERIVATIVES`] after its first step.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered. [`Error::Failed`]: it cannot be told.
+    fn output_derivatives(&self, _ids: &[u32], _out: &mut [f64]) -> Result {
+        Err(Error::Unsupported)
+    }
+
     /// All actions of this instance.
     fn actions(&self) -> &[Action] {
         &[]

@@ -9,7 +9,7 @@ use super::table;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::Recall;
 use terraglue_host::{Instance, Reply};
-use terraglue_scenario::{Connection, ConnectionOrder, InputError, Source};
+use terraglue_scenario::{Connection, ConnectionOrder, Extrapolate, InputError, Source};
 use terraglue_subsystem::unit::Unit;
 use terraglue_subsystem::{Capabilities, Causality, ValueType, Values, ValuesMut};
 
@@ -69,17 +69,36 @@ impl Link {
         }
     }
 
-    /// Goes on along the line through the last two values, where there is one.
+    /// Goes on along the line of the values, where there is one.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the source cannot tell a derivative that it has promised.
     #[inline]
-    pub fn extrapolate(&mut self, moment: Moment) {
+    pub fn extrapolate(&mut self, moment: Moment, instances: &[Instance]) -> Result {
         if let Some(line) = &mut self.extrapolation {
-            line.take(moment, &self.numbers[..self.ids.len() / 2]);
+            let n = self.ids.len() / 2;
+            let mut slopes = None;
+            if line.by_derivatives() && moment.nominal > 0 && line.is_fresh(moment) {
+                let (source, mut told) = (&instances[self.from], vec![0.0; n]);
+                if !source.output_derivatives(&self.ids[..n], &mut told)? {
+                    let why = "it tells no derivatives of these outputs".to_owned();
+                    return Err(source.error("output_derivatives", why));
+                }
+                told.iter_mut().zip(&self.numbers[n..2 * n]).for_each(|(slope, factor)| *slope *= factor);
+                slopes = Some(told);
+            }
+            line.take(moment, &self.numbers[..n], slopes.as_deref());
         }
+        Ok(())
     }
 
-    /// Whether its inputs follow a line.
-    pub fn is_extrapolated(&self) -> bool {
-        self.extrapolation.is_some()
+    /// What its inputs follow.
+    pub fn extrapolates(&self) -> Extrapolate {
+        match &self.extrapolation {
+            None => Extrapolate::Constant,
+            Some(line) if line.by_derivatives() => Extrapolate::Derivatives,
+            Some(_) => Extrapolate::Linear,
+        }
     }
 
     /// For a snapshot.
@@ -396,12 +415,14 @@ impl Resolving<'_> {
         let Connection { order, extrapolate, .. } = *connection;
         let links = &mut self.links.numbers;
         let same = |l: &Link| {
-            l.from == from.slot && l.to == to.slot && l.order == order && l.is_extrapolated() == extrapolate
+            l.from == from.slot && l.to == to.slot && l.order == order && l.extrapolates() == extrapolate
         };
         let k = links.iter().position(same).unwrap_or_else(|| {
             let takes_end = instances[to.slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
-            let line = || Extrapolation::new([from, to].map(|end| multiples[end.slot]), takes_end);
-            let extrapolation = extrapolate.then(|| Box::new(line()));
+            let by_derivatives = extrapolate == Extrapolate::Derivatives;
+            let multiples = [from, to].map(|end| multiples[end.slot]);
+            let line = || Extrapolation::new(multiples, takes_end, by_derivatives);
+            let extrapolation = (extrapolate != Extrapolate::Constant).then(|| Box::new(line()));
             let (ids, numbers) = (Vec::new(), Vec::new());
             links.push(Link { from: from.slot, to: to.slot, order, ids, numbers, extrapolation });
             links.len() - 1
@@ -446,8 +467,15 @@ fn check(
     let Connection { factor, offset, convert, .. } = *connection;
     let takes_factor = matches!(a.value_type, ValueType::F64 | ValueType::F32)
         || discrete::is_whole(a.value_type) && !mapped;
-    if connection.extrapolate && a.value_type != ValueType::F64 {
+    if connection.extrapolate != Extrapolate::Constant && a.value_type != ValueType::F64 {
         return Err(format!("`{from_name}` is no number of 64 bits: it cannot be extrapolated"));
+    }
+    let tells = || instances[from.slot].capabilities().has(Capabilities::OUTPUT_DERIVATIVES);
+    if connection.extrapolate == Extrapolate::Derivatives && !tells() {
+        return Err(format!(
+            "`{from_name}` has no derivative that its subsystem tells: only FMUs with `maxOutputDerivativeOrder` that are not \
+             isolated do; `extrapolate = \"linear\"` needs none"
+        ));
     }
     if (factor, offset) != (1.0, 0.0) && !takes_factor {
         return Err(format!("`{from_name}` is of a type that takes neither `factor` nor `offset`"));

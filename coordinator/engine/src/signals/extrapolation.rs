@@ -1,5 +1,5 @@
 //! Inputs that follow their source beyond the last communication point (`extrapolate = "linear"`), along the line through its last two
-//! values.
+//! values, or along the derivative that the source tells (`extrapolate = "derivatives"`).
 //!
 //! An input is held over a step, so a subsystem that integrates it takes the mean of the line over its step, which makes the exchange of
 //! second order. One whose outputs follow its inputs at once takes the value at the end, to which its outputs belong. Source and target may
@@ -24,13 +24,15 @@ pub struct Moment {
     pub nominal: u64,
 }
 
-/// The line through the last two values of each source of a connection.
+/// The line of each source of a connection.
 #[derive(Debug)]
 pub struct Extrapolation {
     /// Steps of the testbed per step of the source and of the target.
     multiples: [u64; 2],
     /// Whether the target takes the value at the end of its step.
     takes_end: bool,
+    /// Whether the source tells the slope; else the line runs through its last two values.
+    by_derivatives: bool,
     /// Time of the last values, s; NaN before the first ones.
     last_s: f64,
     /// Steps of source and target that were seen last.
@@ -45,10 +47,11 @@ pub struct Extrapolation {
 
 impl Extrapolation {
     /// Of a source and a target that make one step per so many of the testbed.
-    pub fn new(multiples: [u32; 2], takes_end: bool) -> Self {
+    pub fn new(multiples: [u32; 2], takes_end: bool, by_derivatives: bool) -> Self {
         Self {
             multiples: multiples.map(|n| u64::from(n.max(1))),
             takes_end,
+            by_derivatives,
             last_s: f64::NAN,
             seen: [0; 2],
             last: Vec::new(),
@@ -58,16 +61,34 @@ impl Extrapolation {
         }
     }
 
-    /// Takes the values at the start of a communication step.
-    pub fn take(&mut self, moment: Moment, values: &[f64]) {
+    /// What the source tells its slopes for.
+    pub fn by_derivatives(&self) -> bool {
+        self.by_derivatives
+    }
+
+    /// Whether the source has made a step since its values were taken last.
+    pub fn is_fresh(&self, moment: Moment) -> bool {
+        let now = moment.nominal / self.multiples[0];
+        self.last_s.is_nan()
+            || if self.multiples[0] == 1 { moment.t > self.last_s } else { now != self.seen[0] }
+    }
+
+    /// Takes the values at the start of a communication step, and their slopes where the source has told them.
+    pub fn take(&mut self, moment: Moment, values: &[f64], slopes: Option<&[f64]>) {
         let Moment { t, h, nominal } = moment;
         let now = self.multiples.map(|n| nominal / n);
         let first = self.last_s.is_nan();
-        let fresh = if self.multiples[0] == 1 { t > self.last_s } else { now[0] != self.seen[0] };
-        if first || fresh {
+        if self.is_fresh(moment) {
             self.slope.resize(values.len(), 0.0);
             for (slope, (value, last)) in self.slope.iter_mut().zip(values.iter().zip(&self.last)) {
                 *slope = (value - last) / (t - self.last_s);
+            }
+            if self.by_derivatives {
+                // before its first step a source has none
+                match slopes {
+                    Some(slopes) => self.slope.copy_from_slice(slopes),
+                    None => self.slope.fill(0.0),
+                }
             }
             self.last.clear();
             self.last.extend_from_slice(values);
@@ -115,11 +136,11 @@ mod tests {
 
     /// What the inputs are set to at the last of some steps, of a source with the value u(t) in its own last step.
     fn ahead(multiples: [u32; 2], takes_end: bool, steps: u64, u: impl Fn(f64) -> f64) -> f64 {
-        let mut line = Extrapolation::new(multiples, takes_end);
+        let mut line = Extrapolation::new(multiples, takes_end, false);
         let source = u64::from(multiples[0]);
         for nominal in 0..steps {
             let told = (nominal / source * source) as f64 * H;
-            line.take(Moment { t: nominal as f64 * H, h: H, nominal }, &[u(told)]);
+            line.take(Moment { t: nominal as f64 * H, h: H, nominal }, &[u(told)], None);
         }
         line.ahead().map_or(f64::NAN, |all| all[0])
     }
@@ -141,10 +162,20 @@ mod tests {
     #[test]
     fn the_first_step_and_a_step_that_is_repeated_have_no_other_line() {
         assert_eq!(ahead([1, 1], false, 1, |t| 1.0 + t), 1.0);
-        let mut line = Extrapolation::new([1, 1], true);
-        line.take(Moment { t: 0.0, h: H, nominal: 0 }, &[1.0]);
-        line.take(Moment { t: H, h: H, nominal: 1 }, &[2.0]);
-        line.take(Moment { t: H, h: 0.5 * H, nominal: 1 }, &[2.0]);
+        let mut line = Extrapolation::new([1, 1], true, false);
+        line.take(Moment { t: 0.0, h: H, nominal: 0 }, &[1.0], None);
+        line.take(Moment { t: H, h: H, nominal: 1 }, &[2.0], None);
+        line.take(Moment { t: H, h: 0.5 * H, nominal: 1 }, &[2.0], None);
         assert!((line.ahead().map_or(f64::NAN, |all| all[0]) - 2.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn slopes_that_are_told_are_the_line_and_the_first_step_is_held() {
+        let mut line = Extrapolation::new([1, 1], false, true);
+        line.take(Moment { t: 0.0, h: H, nominal: 0 }, &[1.0], None);
+        assert_eq!(line.ahead(), Some(&[1.0][..]));
+        // the last two values have another slope
+        line.take(Moment { t: H, h: H, nominal: 1 }, &[2.0], Some(&[3.0]));
+        assert!((line.ahead().map_or(f64::NAN, |all| all[0]) - (2.0 + 3.0 * 0.5 * H)).abs() < 1e-12);
     }
 }

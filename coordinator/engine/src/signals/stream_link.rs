@@ -8,7 +8,7 @@ use super::modifier::Fate;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::{Recall, Remember};
 use terraglue_host::{Instance, Reply};
-use terraglue_scenario::Connection;
+use terraglue_scenario::{Connection, Extrapolate};
 use terraglue_subsystem::{Causality, ValueType, Values};
 
 /// One connection of a stream.
@@ -116,7 +116,7 @@ pub fn check(
     if v.value_type != ValueType::Binary || v.causality != Causality::Input {
         return Err(format!("`{name}` is a stream and `{target}` no input of bytes (type binary)"));
     }
-    if connection.extrapolate {
+    if connection.extrapolate != Extrapolate::Constant {
         return Err(format!("`{name}` is a stream: it cannot be extrapolated"));
     }
     if !connection.map.is_empty() || (connection.factor, connection.offset) != (1.0, 0.0) {

@@ -69,7 +69,7 @@ impl Signals {
         if !self.faults.is_empty() {
             self.faults.apply((moment.t, step_s), &mut self.links, instances, tell)?;
         }
-        self.links.numbers.iter_mut().for_each(|link| link.extrapolate(moment));
+        self.links.numbers.iter_mut().try_for_each(|link| link.extrapolate(moment, instances))?;
         self.write(instances)
     }
 

@@ -1,6 +1,7 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
-use super::checks::{check_groups, check_report, gap_words};
+use super::checks::{check_groups, check_report};
+use super::declared_glue::{body_states, declared};
 use super::glued::GluedGroups;
 use super::group::Group;
 use super::loops::{Loops, NO_LOOP};
@@ -35,7 +36,7 @@ use terraglue_scenario::{
     Entry, GlueSpec, GluingSpec, InputError, IsolationSpec, LevelChoice, Scenario, StrategyKind,
     SubsystemSpec,
 };
-use terraglue_subsystem::{BodyState, Capabilities, Config, Kind, Law, Level, Mount, Subsystem, Terrain};
+use terraglue_subsystem::{BodyState, Capabilities, Config, Kind, Level, Mount, Subsystem, Terrain};
 use terraglue_terrain as terrain;
 
 impl Testbed {
@@ -70,10 +71,10 @@ impl Testbed {
         let services = change(services);
         let services = with_loop_state(services);
         advise(scenario);
-        let instances = instantiate(scenario, options, library, &services)?;
+        let mut instances = instantiate(scenario, options, library, &services)?;
         let mut signals = signals(scenario, &instances)?;
         check_report(scenario, &signals.directory, &instances)?;
-        let groups = groups(scenario, &instances)?;
+        let groups = groups(scenario, &mut instances)?;
         check_groups(scenario, &groups, &instances)?;
         let mut subsystems = Subsystems {
             schedules: schedules(scenario, &instances, &groups),
@@ -427,8 +428,9 @@ fn schedules(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> V
 }
 
 /// Bodies that can touch the ground, with the ground, and all that glue connects: one group each.
-fn groups(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Group>> {
-    let glue = glue(scenario, instances)?;
+fn groups(scenario: &Scenario, instances: &mut [Instance]) -> Result<Vec<Group>> {
+    let glue = declared(scenario, instances)?;
+    let instances = &*instances;
     pieces::check(scenario, instances, &glue, &body_states(instances)?)?;
     let grounds: Vec<usize> = (0..instances.len()).filter(|k| instances[*k].kind() == Kind::Soil).collect();
     if let [first, second, ..] = grounds[..] {
@@ -570,109 +572,6 @@ fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Res
         return Err(scenario.source.error_at_value(at, message, Some(help)).into());
     }
     Ok(Some(StepControl::new(tolerance, [shortest, longest])))
-}
-
-/// Committed states of all bodies.
-fn body_states(instances: &[Instance]) -> Result<Vec<Vec<BodyState>>> {
-    let mut states: Vec<Vec<BodyState>> = Vec::new();
-    for instance in instances {
-        let mut own = vec![BodyState::REST; instance.scene().bodies.len()];
-        instance.body_states(&mut own)?;
-        states.push(own);
-    }
-    Ok(states)
-}
-
-/// The glue that the scenario declares, between bodies that exist.
-fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
-    let mut glue = Vec::new();
-    let source = &scenario.source;
-    let wrong = |spec: &GlueSpec, words: &[&str], message: String, help: Option<String>| {
-        Error::from(source.error_in(spec.entry, words, message, help))
-    };
-    let states = body_states(instances)?;
-    for (number, spec) in scenario.glue.iter().enumerate() {
-        let mut ends = [None; 2];
-        for (end, side) in ends.iter_mut().zip(&spec.sides).filter(|(_, side)| *side != "world") {
-            let (name, body) = side.split_once('.').unwrap_or((side, ""));
-            let slot = instances.iter().position(|i| i.name() == name);
-            let found = slot
-                .and_then(|s| Some((s, instances[s].scene().bodies.iter().position(|b| b.name == body)?)));
-            let Some((slot, k)) = found else {
-                let names: Vec<&str> = slot
-                    .iter()
-                    .flat_map(|s| instances[*s].scene().bodies.iter().map(|b| b.name.as_str()))
-                    .collect();
-                let help = scenario::did_you_mean(body, names.iter().copied());
-                return Err(wrong(spec, &[side], format!("glue: body `{side}` does not exist"), help));
-            };
-            *end = Some((slot, k as u32));
-        }
-        let soil_at = |e: usize| ends[e].is_some_and(|(s, _)| instances[s].kind() == Kind::Soil);
-        if soil_at(0) || soil_at(1) && !spec.contact {
-            let message = "a soil is side 2 of glue of kind `contact`".into();
-            return Err(wrong(spec, &[&spec.sides[1]], message, None));
-        }
-        if ends[0].map(|e| e.0) == ends[1].map(|e| e.0) {
-            return Err(wrong(spec, &[&spec.sides[1]], "glue joins two different subsystems".into(), None));
-        }
-        let law = Law {
-            t_min: if spec.contact { 0.0 } else { f64::NEG_INFINITY },
-            t_max: spec.t_max,
-            mu: if spec.contact { spec.mu } else { f64::INFINITY },
-            compliance: spec.compliance,
-        };
-        let axes =
-            if spec.contact { axes(spec.normal) } else { [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] };
-        let at = spec.at_m.or(if spec.contact && soil_at(1) {
-            ends[0].map(|(s, b)| states[s][b as usize].world_from_body.position)
-        } else {
-            None
-        });
-        let (mask, turning, soil) = (spec.mask, spec.turning, soil_at(1));
-        let (damping, contact, ramp_s) = (spec.damping, spec.contact, spec.ramp_s);
-        let recipe = Recipe { number, ends, at, mask, axes, turning, law, damping, ramp_s, contact, soil };
-        if let Some(gap_m) = gap_at_start(&recipe, &states) {
-            let (message, help) = gap_words(&spec.sides, gap_m);
-            return Err(wrong(spec, &[&spec.sides[1]], message, Some(help)));
-        }
-        glue.push(recipe);
-    }
-    Ok(glue)
-}
-
-/// How far the points of a joint without compliance and ramp lie apart at the start along the components that it glues, m; none:
-/// by rounding only.
-fn gap_at_start(recipe: &Recipe, states: &[Vec<BodyState>]) -> Option<f64> {
-    if recipe.contact || recipe.law.compliance > 0.0 || recipe.ramp_s > 0.0 || recipe.at.is_some() {
-        return None;
-    }
-    let place = |e: usize| {
-        let state = recipe.ends[e].map_or(BodyState::REST, |(slot, body)| states[slot][body as usize]);
-        state.world_from_body.position
-    };
-    let [a, b] = [place(0), place(1)];
-    let along = |axis: usize| (0..3).map(|k| recipe.axes[3 * axis + k] * (a[k] - b[k])).sum::<f64>();
-    let glued = (0..3).filter(|axis| recipe.mask & (1 << axis) != 0);
-    let gap = glued.map(|axis| along(axis).powi(2)).sum::<f64>().sqrt();
-    let scale = a.iter().chain(&b).fold(1.0_f64, |m, x| m.max(x.abs()));
-    (gap > GAP * scale).then_some(gap)
-}
-
-/// Gap at the start that is rounding, as a share of the places of the two bodies, or in m where these are below 1 m.
-const GAP: f64 = 1e-6;
-
-/// n along a vector and two tangents: the first in the plane of n and x where that exists.
-fn axes(normal: [f64; 3]) -> [f64; 9] {
-    let size = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let n = normal.map(|x| if size > 0.0 { x / size } else { 0.0 });
-    let seed = if n[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let along: f64 = (0..3).map(|k| seed[k] * n[k]).sum();
-    let t = [0, 1, 2].map(|k| seed[k] - along * n[k]);
-    let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let t = t.map(|x| x / length);
-    let b = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
-    [n[0], n[1], n[2], t[0], t[1], t[2], b[0], b[1], b[2]]
 }
 
 fn detector(

@@ -111,7 +111,7 @@ pub(super) fn gap_words([a, b]: &[String; 2], gap_m: f64) -> (String, String) {
     let message = format!(
         "glue: `{a}` and `{b}` are {gap} m apart along what the joint glues; the first step would close this gap at once"
     );
-    let help = "move one of the two bodies there, glue one point of both with `at_m = [x, y, z]`, or close the gap slowly with \
-                `ramp_s = 0.5`";
+    let help = "move one of the two bodies there, glue one point of both with `at_m = [x, y, z]`, move a robot there with \
+                `close = \"project\"`, or close the gap slowly with `ramp_s = 0.5`";
     (message, help.into())
 }

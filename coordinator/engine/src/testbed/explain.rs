@@ -8,7 +8,7 @@ use super::step_order::StepOrder;
 use crate::signals::{Links, VariableRef, streams};
 use serde::{Deserialize, Serialize};
 use terraglue_host::Instance;
-use terraglue_scenario::Scenario;
+use terraglue_scenario::{Extrapolate, Scenario};
 use terraglue_subsystem::Capabilities;
 
 /// Output of `terraglue run --explain`, also shown in the report; nothing in it was measured.
@@ -73,8 +73,11 @@ impl Sight<'_> {
             let passes = match () {
                 () if self.order.is_within(k) => Passes::AtEnd,
                 () if self.loops.has(k) => Passes::Repeatedly,
-                () if link.is_extrapolated() => Passes::AlongLine,
-                () => Passes::AtStart,
+                () => match link.extrapolates() {
+                    Extrapolate::Constant => Passes::AtStart,
+                    Extrapolate::Linear => Passes::AlongLine,
+                    Extrapolate::Derivatives => Passes::AlongDerivative,
+                },
             };
             link.ends().map(move |([from, to], conversion)| ConnectionEnds {
                 from,
@@ -199,6 +202,10 @@ impl Sight<'_> {
                 n.to_string(),
                 "read at the start of a step; the input follows the line through the last two values".to_owned(),
             ),
+            (Passes::AlongDerivative, n) => (
+                n.to_string(),
+                "read at the start of a step; the input follows the derivative that its source tells".to_owned(),
+            ),
             (Passes::AtStart, 1) => {
                 ("1".to_owned(), "read at the start of a step and held to its end".to_owned())
             }
@@ -275,6 +282,8 @@ enum Passes {
     AtStart,
     /// Read at its start; the input follows a line.
     AlongLine,
+    /// Read at its start; the input follows the derivative of the output.
+    AlongDerivative,
     /// Read at its end, by a target that is stepped later.
     AtEnd,
     /// The step is repeated until they stand.

@@ -3,7 +3,8 @@
 //!
 //! An FMU whose outputs follow its inputs at once takes the value at the end of the step; any other one takes the mean of the values
 //! at start and end, which makes the step of second order. Each repetition begins with the state at the start of the step.
-//! Relaxation after Aitken's Δ² process for vectors (Irons and Tuck, 1969; Küttler and Wall, 2008, eq. 44).
+//! The next values are those that Anderson's combination (1965) makes of the last six: it needs no derivatives, and solves loops whose
+//! gains are above one, too.
 
 use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
@@ -11,8 +12,9 @@ use super::subsystems::Subsystems;
 use crate::signals::{Faults, Links, held};
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
+use terraglue_gluing::acceleration::Acceleration;
 use terraglue_host::Instance;
-use terraglue_scenario::ModuleKind;
+use terraglue_scenario::{ModuleKind, Relaxation};
 use terraglue_subsystem::{Capabilities, Response};
 
 /// Most repetitions of a step.
@@ -33,18 +35,33 @@ struct Iterated {
 }
 
 /// All loops of a run.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Loops {
     links: Vec<Iterated>,
     /// Those that repeat the step, ascending.
     members: Vec<usize>,
     /// Number under which they keep the state at its start.
     state: u32,
-    /// Values at the start of the step, those that the trial was made with, and the residual before.
+    /// Values at the start of the step, and those that the trial was made with.
     start: Vec<f64>,
     guess: Vec<f64>,
-    before: Vec<f64>,
-    relaxation: f64,
+    acceleration: Acceleration,
+    /// Whether no trial of the step was looked at yet.
+    first: bool,
+}
+
+impl Default for Loops {
+    fn default() -> Self {
+        Self {
+            links: Vec::new(),
+            members: Vec::new(),
+            state: 0,
+            start: Vec::new(),
+            guess: Vec::new(),
+            acceleration: Acceleration::new(Relaxation::Anderson, 1.0),
+            first: true,
+        }
+    }
 }
 
 impl Loops {
@@ -109,8 +126,7 @@ impl Loops {
         };
         self.start = self.links.iter().flat_map(values).collect();
         self.guess.clone_from(&self.start);
-        self.before.clear();
-        self.relaxation = 1.0;
+        self.first = true;
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
     }
 
@@ -145,7 +161,8 @@ impl Loops {
 
     /// Whether the outputs are those that the trial was made with; if not, a better guess is there.
     fn stands(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
-        let mut residual = Vec::with_capacity(self.guess.len());
+        let residual = self.acceleration.residual();
+        residual.clear();
         let mut stands = true;
         for own in &self.links {
             for value in links.numbers[own.link].read(instances)? {
@@ -154,16 +171,8 @@ impl Loops {
                 residual.push(value - guess);
             }
         }
-        if self.before.len() == residual.len() {
-            let change = || residual.iter().zip(&self.before).map(|(now, before)| now - before);
-            let square: f64 = change().map(|d| d * d).sum();
-            let product: f64 = self.before.iter().zip(change()).map(|(before, d)| before * d).sum();
-            if square > 0.0 {
-                self.relaxation = (-self.relaxation * product / square).clamp(-10.0, 10.0);
-            }
-        }
-        self.guess.iter_mut().zip(&residual).for_each(|(guess, r)| *guess += self.relaxation * r);
-        self.before = residual;
+        let step = self.acceleration.step(std::mem::take(&mut self.first), &self.guess);
+        self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
         Ok(stands)
     }
 

@@ -109,7 +109,8 @@ fn put_terrain(w: &mut Writer, terrain: &dyn Terrain) {
 
 impl Subsystem for Isolated {
     fn capabilities(&self) -> Capabilities {
-        self.about.capabilities
+        // the exchange with the worker has no question for them
+        Capabilities(self.about.capabilities.0 & !Capabilities::OUTPUT_DERIVATIVES.0)
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {

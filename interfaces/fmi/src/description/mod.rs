@@ -133,6 +133,9 @@ fn capabilities(element: &Element, version: Version) -> Result<Capabilities> {
         intermediate_update: flag("providesIntermediateUpdate")?,
         return_early: flag("canReturnEarlyAfterIntermediateUpdate")?,
         interpolates_inputs: flag("canInterpolateInputs")?,
+        output_derivatives: element
+            .optional_number("maxOutputDerivativeOrder")?
+            .is_some_and(|order| order >= 1.0),
     })
 }
 

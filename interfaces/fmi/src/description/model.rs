@@ -103,6 +103,8 @@ pub struct Capabilities {
     pub return_early: bool,
     /// Takes derivatives of its inputs (FMI 2).
     pub interpolates_inputs: bool,
+    /// Tells the first derivatives of its outputs.
+    pub output_derivatives: bool,
 }
 
 /// What an FMU wants to be run with.

@@ -95,6 +95,7 @@ table! {
         directional = "fmi2GetDirectionalDerivative":
             fn(InstanceHandle, *const Vr, usize, *const Vr, usize, *const f64, *mut f64) -> c_int;
         set_slopes = "fmi2SetRealInputDerivatives": fn(InstanceHandle, *const Vr, usize, *const c_int, *const f64) -> c_int;
+        get_slopes = "fmi2GetRealOutputDerivatives": fn(InstanceHandle, *const Vr, usize, *const c_int, *mut f64) -> c_int;
     }
 }
 
@@ -161,6 +162,8 @@ table! {
             fn(InstanceHandle, *const Vr, usize, *const Vr, usize, *const f64, usize, *mut f64, usize) -> c_int;
         adjoint = "fmi3GetAdjointDerivative":
             fn(InstanceHandle, *const Vr, usize, *const Vr, usize, *const f64, usize, *mut f64, usize) -> c_int;
+        get_slopes = "fmi3GetOutputDerivatives":
+            fn(InstanceHandle, *const Vr, usize, *const c_int, *mut f64, usize) -> c_int;
     }
 }
 

@@ -218,6 +218,32 @@ impl FmuInstance {
         }
     }
 
+    /// First derivatives of outputs by time, per second; of f64 that are no arrays.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: the FMU does not offer them, or there are not as many places as references. [`Error::Call`]: it failed.
+    pub fn output_derivatives(&self, references: &[u32], out: &mut [f64]) -> Result {
+        offered(self.description.capabilities.output_derivatives, "derivatives of outputs")?;
+        if references.len() != out.len() {
+            let (n, m) = (references.len(), out.len());
+            return Err(Error::Refused(format!("{n} references but {m} derivatives")));
+        }
+        let orders = vec![1; references.len()];
+        let (r, n, o, x) = (references.as_ptr(), references.len(), orders.as_ptr(), out.as_mut_ptr());
+        match self.foreign.api {
+            Api::Two(two) => {
+                // SAFETY: as many orders and values as references.
+                self.foreign
+                    .call("fmi2GetRealOutputDerivatives", two.get_slopes, |f, c| unsafe { f(c, r, n, o, x) })
+            }
+            Api::Three(three) => {
+                // SAFETY: as above.
+                self.foreign
+                    .call("fmi3GetOutputDerivatives", three.get_slopes, |f, c| unsafe { f(c, r, n, o, x, n) })
+            }
+        }
+    }
+
     /// seedᵀ·d(unknowns)/d(knowns): a number for each known (FMI 3.0, 2.2.11).
     ///
     /// # Errors

@@ -42,7 +42,12 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
         ),
         Figure::new("fmi.order.jacobi", percent(late), Limit::None, what("each connection late by a step")),
         Figure::new("fmi.order.linear", percent(line), Limit::None, what("the force along a line")),
-        Figure::new("fmi.order.iterate", percent(off(&iterated)), Limit::None, what("the loop iterated")),
+        Figure::new(
+            "fmi.order.iterate",
+            percent(off(&iterated)),
+            Limit::AtMost(0.01),
+            what("the loop iterated"),
+        ),
         Figure::new(
             "fmi.order.iterate.amplitude",
             percent((iterated.amplitude / X0 - 1.0).abs()),

@@ -19,6 +19,7 @@ mod process;
 mod rigid_body;
 mod soil;
 mod stored;
+mod sweep;
 mod table;
 mod timing;
 mod walk;
@@ -108,7 +109,7 @@ impl Context {
 type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
 /// Areas with their parts, in the order of the tables.
-const AREAS: [(&str, &[Part]); 9] = [
+const AREAS: [(&str, &[Part]); 10] = [
     ("walk", &[("walk", walk::figures), ("speed", walk::speed::figures)]),
     ("rigid-body", &rigid_body::PARTS),
     ("soil", &soil::PARTS),
@@ -118,6 +119,7 @@ const AREAS: [(&str, &[Part]); 9] = [
     ("world", &world::PARTS),
     ("forest", &forest::PARTS),
     ("page", &watched::PARTS),
+    ("sweep", &sweep::PARTS),
 ];
 
 fn area_names() -> Vec<&'static str> {

@@ -10,6 +10,7 @@ mod loops;
 mod order;
 mod pair;
 mod reference;
+mod setup;
 mod third_party;
 mod turning;
 mod watched;
@@ -22,7 +23,7 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 10] = [
+pub const PARTS: [Part; 11] = [
     ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
     ("turning", |context| turning::figures(&workplace(context)?)),
     ("loops", |context| loops::figures(&workplace(context)?)),
@@ -31,6 +32,7 @@ pub const PARTS: [Part; 10] = [
     ("archives", |context| hostile::archives::figures(&workplace(context)?, context)),
     ("behaviour", |context| hostile::behaviour::figures(&workplace(context)?, context)),
     ("reference", reference::figures),
+    ("setup", |context| setup::figures(&workplace(context)?, context)),
     ("third-party", |context| third_party::figures(&workplace(context)?, context)),
     ("cost", |context| cost::figures(&workplace(context)?, context)),
 ];

@@ -7,6 +7,7 @@ pub(super) mod fmus;
 mod folder;
 mod hostile;
 mod loops;
+mod master;
 mod order;
 mod pair;
 mod reference;
@@ -23,11 +24,12 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 11] = [
+pub const PARTS: [Part; 12] = [
     ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
     ("turning", |context| turning::figures(&workplace(context)?)),
     ("loops", |context| loops::figures(&workplace(context)?)),
     ("order", |context| order::figures(&workplace(context)?)),
+    ("master", |context| master::figures(&workplace(context)?, context)),
     ("cycles", |context| cycles::figures(&workplace(context)?, context.quick)),
     ("archives", |context| hostile::archives::figures(&workplace(context)?, context)),
     ("behaviour", |context| hostile::behaviour::figures(&workplace(context)?, context)),

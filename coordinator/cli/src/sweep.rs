@@ -11,12 +11,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use terraglue_diagnostics::{Error, Result};
+use terraglue_engine::observer::Observer;
 use terraglue_engine::testbed::Testbed;
+use terraglue_recording::{Status, SummaryObserver};
 use terraglue_scenario::{InputError, Scenario, SweepPlan, did_you_mean};
-use terraglue_sweep::{CASES, Collected, Points, RESULTS, Settings, Sweep, collect, points, write_page};
+use terraglue_sweep::{
+    CASES, Collected, Points, RESULTS, Settings, Sweep, collect, keys, points, write_page,
+};
 
-/// Values of one key that are tried before the list is written; a value that does not fit is found at its case, too.
+/// Values of one key that are tried before the list is written, and of those the ones that a testbed is built with; a value that
+/// does not fit is found at its case, too.
 const MOST_TRIED: usize = 16;
+/// See [`MOST_TRIED`].
+const MOST_BUILT: usize = 8;
 
 /// Does what the arguments say.
 pub fn sweep(arguments: &SweepArguments) -> Result<Exit> {
@@ -93,8 +100,8 @@ fn tried(plan: &SweepPlan, points: &Points, sets: &[(String, String)], modules: 
         sets.iter().cloned().chain(points.keys.iter().cloned().zip(row.iter().cloned())).collect()
     };
     let built = |row: &[String]| built(&plan.scenario, &of(row), modules);
-    let testbed = built(first).map_err(|e| of_plan(plan, points, first, e))?;
-    known(&testbed, &plan.spec.collect)?;
+    let (testbed, scenario) = built(first).map_err(|e| of_plan(plan, points, first, e))?;
+    known(&testbed, &scenario, &plan.spec.collect)?;
     drop(testbed);
     for k in 0..points.keys.len() {
         let mut seen = vec![first[k].as_str()];
@@ -105,17 +112,17 @@ fn tried(plan: &SweepPlan, points: &Points, sets: &[(String, String)], modules: 
             seen.push(&row[k]);
             let mut own = first.clone();
             own[k].clone_from(&row[k]);
-            if let Err(error) = Scenario::load(&plan.scenario, &of(&own)) {
-                let help = error.help.clone();
-                let message = format!("{} = {}: {}", points.keys[k], row[k], error.message);
-                return Err(plan.error(&points.keys[k], message, help).into());
-            }
+            let tried = match seen.len() <= MOST_BUILT {
+                true => built(&own).map(drop),
+                false => Scenario::load(&plan.scenario, &of(&own)).map(drop).map_err(Error::from),
+            };
+            tried.map_err(|error| at_key(plan, (&points.keys[k], &row[k]), error))?;
         }
     }
     Ok(())
 }
 
-fn built(scenario: &Path, sets: &[(String, String)], modules: &[PathBuf]) -> Result<Testbed> {
+fn built(scenario: &Path, sets: &[(String, String)], modules: &[PathBuf]) -> Result<(Testbed, Scenario)> {
     let arguments = ScenarioArguments {
         scenario: scenario.to_owned(),
         sets: sets.to_vec(),
@@ -123,7 +130,8 @@ fn built(scenario: &Path, sets: &[(String, String)], modules: &[PathBuf]) -> Res
     };
     let loaded = Scenario::load(scenario, sets)?;
     soil_module::check(&loaded, &arguments)?;
-    testbed::build(&loaded, &testbed::options_of(1, modules, &Arc::new(AtomicBool::new(false))))
+    let options = testbed::options_of(1, modules, &Arc::new(AtomicBool::new(false)));
+    Ok((testbed::build(&loaded, &options)?, loaded))
 }
 
 /// An error of the first case, at the key whose edit it is about.
@@ -132,24 +140,35 @@ fn of_plan(plan: &SweepPlan, points: &Points, first: &[String], error: Error) ->
     let text = input.source_code.inner();
     let about = points.keys.iter().zip(first).find(|(key, value)| *text == format!("{key}={value}"));
     match about {
-        Some((key, value)) => {
-            plan.error(key, format!("{key} = {value}: {}", input.message), input.help.clone()).into()
-        }
+        Some(about) => at_key(plan, about, error),
         None => error,
     }
 }
 
-/// Variables that are collected must be there; keys of the summary are known when there is one.
-fn known(testbed: &Testbed, names: &[String]) -> Result {
-    let variables = testbed.signals().directory.names();
-    let subsystems: Vec<&str> = variables.iter().filter_map(|name| Some(name.split_once('.')?.0)).collect();
-    for name in names {
-        let of_subsystem = name.split_once('.').is_some_and(|(subsystem, _)| subsystems.contains(&subsystem));
-        if of_subsystem && testbed.read(name).is_none() {
-            let help = did_you_mean(name, variables.iter().map(String::as_str));
-            let message = format!("sweep.collect: there is no variable `{name}` that is a number");
-            return Err(InputError::plain(message, help).into());
+/// An error that a value of a key makes, at the key in the plan.
+fn at_key(plan: &SweepPlan, (key, value): (&String, &String), error: Error) -> Error {
+    match error {
+        Error::Input(input) => {
+            plan.error(key, format!("{key} = {value}: {}", input.message), input.help.clone()).into()
         }
+        other => plan.error(key, format!("{key} = {value}: {other}"), None).into(),
+    }
+}
+
+/// What is collected must be a variable that is a number, or a key of the summary.
+fn known(testbed: &Testbed, scenario: &Scenario, names: &[String]) -> Result {
+    if names.is_empty() {
+        return Ok(());
+    }
+    let mut summary = SummaryObserver::new(scenario);
+    testbed.view(|view| summary.started(view))?;
+    let keys = keys(&summary.summary(0.0, 0.0, None, Status::Done));
+    let variables = testbed.signals().directory.names();
+    for name in names.iter().filter(|name| !keys.contains(name) && testbed.read(name).is_none()) {
+        let all = variables.iter().chain(&keys).map(String::as_str);
+        let message =
+            format!("sweep.collect: `{name}` is no variable that is a number, and no key of summary.json");
+        return Err(InputError::plain(message, did_you_mean(name, all)).into());
     }
     Ok(())
 }

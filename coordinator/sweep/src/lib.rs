@@ -18,7 +18,7 @@ mod statistics;
 
 pub use collect::{Collected, Row, collect};
 pub use folder::{CASES, Case, PAGE, RESULTS, Settings, Sweep};
-pub use outcome::{CaseStatus, Outcome, figures};
+pub use outcome::{CaseStatus, Outcome, figures, keys};
 pub use page::write as write_page;
 pub use points::{Points, points};
 pub use statistics::{Counted, Sampled};

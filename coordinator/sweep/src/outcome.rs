@@ -91,23 +91,32 @@ const MACHINE: [&str; 5] = ["wall_s", "cpu_s", "real_time_factor", "cpu_real_tim
 
 /// All numbers of a summary by their key, those of inner tables with a dot between.
 pub fn figures(summary: &Summary) -> BTreeMap<String, f64> {
-    let mut all = BTreeMap::new();
+    let number = |(key, value): (String, Value)| Some((key, value.as_f64()?));
+    flat(summary).into_iter().filter_map(number).collect()
+}
+
+/// The keys of all numbers that a summary can have.
+pub fn keys(summary: &Summary) -> Vec<String> {
+    let is_number = |value: &Value| value.is_number() || value.is_null();
+    flat(summary).into_iter().filter(|(_, value)| is_number(value)).map(|(key, _)| key).collect()
+}
+
+/// What does not depend on the machine, without inner tables.
+fn flat(summary: &Summary) -> Vec<(String, Value)> {
+    let mut all = Vec::new();
     if let Ok(Value::Object(table)) = serde_json::to_value(summary) {
-        let own = table.iter().filter(|(key, _)| !MACHINE.contains(&key.as_str()));
-        own.for_each(|(key, value)| flatten(key.clone(), value, &mut all));
+        let own = table.into_iter().filter(|(key, _)| !MACHINE.contains(&key.as_str()));
+        own.for_each(|(key, value)| flatten(key, value, &mut all));
     }
     all
 }
 
-fn flatten(key: String, value: &Value, all: &mut BTreeMap<String, f64>) {
+fn flatten(key: String, value: Value, all: &mut Vec<(String, Value)>) {
     match value {
-        Value::Number(number) => {
-            all.extend(number.as_f64().map(|x| (key, x)));
-        }
         Value::Object(table) => {
-            table.iter().for_each(|(name, value)| flatten(format!("{key}.{name}"), value, all));
+            table.into_iter().for_each(|(name, value)| flatten(format!("{key}.{name}"), value, all));
         }
-        _ => {}
+        other => all.push((key, other)),
     }
 }
 
@@ -128,12 +137,10 @@ mod tests {
     }
 
     #[test]
-    fn inner_tables_have_dots_and_texts_are_no_figures() {
-        let mut all = BTreeMap::new();
-        let value = serde_json::json!({ "energies": { "friction_j": 2.0, "of": null }, "name": "x", "n": 3 });
-        if let Value::Object(table) = value {
-            table.iter().for_each(|(key, value)| flatten(key.clone(), value, &mut all));
-        }
-        assert_eq!(all, BTreeMap::from([("energies.friction_j".into(), 2.0), ("n".into(), 3.0)]));
+    fn inner_tables_have_dots() {
+        let mut all = Vec::new();
+        let value = serde_json::json!({ "friction_j": 2.0, "of": { "n": 3 } });
+        flatten("energies".into(), value, &mut all);
+        assert_eq!(all, [("energies.friction_j".into(), 2.0.into()), ("energies.of.n".into(), 3.into())]);
     }
 }

@@ -7,10 +7,12 @@ use std::path::Path;
 /// The library inside exported FMUs.
 const FMU_LIBRARY: &str = "libterraglue_fmu_library.so";
 
-/// Builds in the release profile and copies what a user needs.
-pub fn install(prefix: &Path) -> Outcome {
-    build()?;
-    lay_out(prefix, "release")?;
+/// Builds in the release profile and copies what a user needs; `built`: of what is built in this profile already.
+pub fn install(prefix: &Path, built: Option<&str>) -> Outcome {
+    if built.is_none() {
+        build()?;
+    }
+    lay_out(prefix, built.unwrap_or("release"))?;
     println!("installed below {}", prefix.display());
     Ok(())
 }
@@ -73,7 +75,7 @@ fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     }
     copy(&release.join(FMU_LIBRARY), &prefix.join("lib/terraglue").join(FMU_LIBRARY))?;
     copy_files(&root().join("interfaces/plugin/include"), &prefix.join("include"))?;
-    copy_files(&root().join("models"), &prefix.join("share/terraglue/models"))?;
+    copy_tree(&root().join("models"), &prefix.join("share/terraglue/models"))?;
     copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))
 }
 

@@ -21,6 +21,9 @@ pub enum Install {
     Install {
         /// Where to, e.g. ~/.local.
         prefix: PathBuf,
+        /// Lay out what is built already: debug or release.
+        #[arg(long, value_name = "PROFILE", value_parser = ["debug", "release"])]
+        built: Option<String>,
     },
 }
 
@@ -32,7 +35,7 @@ impl Install {
     pub fn done(&self) -> Outcome {
         match self {
             Self::Dist { built } => install::dist(built.as_deref()),
-            Self::Install { prefix } => install::install(prefix),
+            Self::Install { prefix, built } => install::install(prefix, built.as_deref()),
         }
     }
 }

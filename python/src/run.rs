@@ -1,0 +1,104 @@
+//! A testbed with what belongs to it: its scenario, its recording, the states that it keeps.
+
+use crate::snapshot::Places;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use terraglue::host::HostServices;
+use terraglue::observer::Observer;
+use terraglue::recording::{Recorder, RecorderOptions, Status, Summary, write_exchange};
+use terraglue::scenario::Scenario;
+use terraglue::testbed::{Options, Testbed};
+use terraglue::{Error, Result};
+
+/// States that a testbed can keep at a time.
+pub const MOST_SNAPSHOTS: u32 = 64;
+
+/// See above.
+pub struct Run {
+    pub testbed: Testbed,
+    pub scenario: Scenario,
+    pub places: Arc<Places>,
+    recorder: Option<Recorder>,
+    failed: Option<String>,
+}
+
+impl Run {
+    /// Builds a scenario; with `out` it is recorded there as `terraglue run` does.
+    ///
+    /// # Errors
+    /// Wrong input, or a folder that cannot be written.
+    pub fn new(scenario: Scenario, threads: usize, modules: &[PathBuf], out: Option<&Path>) -> Result<Self> {
+        let options = Options { threads, module_paths: modules.to_vec(), ..Options::default() };
+        let slots = |services: HostServices| HostServices { slots: MOST_SNAPSHOTS, ..services };
+        let mut testbed = Testbed::build_hosted(&scenario, &options, &terraglue::library(), slots)?;
+        let mut recorder = None;
+        if let Some(folder) = out {
+            std::fs::create_dir_all(folder)
+                .map_err(|source| Error::File { path: folder.display().to_string(), source })?;
+            recorder = Some(Recorder::create(folder, &scenario, RecorderOptions::default())?);
+        }
+        testbed.begin()?;
+        if let Some(recorder) = &mut recorder {
+            testbed.view(|view| recorder.started(view))?;
+        }
+        if let Some(folder) = out {
+            write_exchange(folder, &testbed.explain())?;
+        }
+        Ok(Self { testbed, scenario, places: Places::new(MOST_SNAPSHOTS), recorder, failed: None })
+    }
+
+    /// Steps up to a time, for `slice` of wall time at most; whether it is there.
+    ///
+    /// # Errors
+    /// The simulation stops, now or before.
+    pub fn run_until(&mut self, until_s: f64, slice: Duration) -> Result<bool> {
+        if let Some(message) = &self.failed {
+            let message = format!("it stopped before: {message}");
+            return Err(Error::Simulation { time_s: self.testbed.t_s(), message });
+        }
+        let step_s = self.scenario.time.step_s;
+        let begin = Instant::now();
+        while self.testbed.t_s() < until_s - 1e-9 * step_s.max(until_s.abs() * 1e-3) {
+            if begin.elapsed() >= slice {
+                return Ok(false);
+            }
+            // several steps at a time, so that the clock is read rarely
+            let next = (self.testbed.t_s() + 8.0 * step_s).min(until_s);
+            let stepped = match &mut self.recorder {
+                Some(recorder) => self.testbed.run_until(next, &mut [recorder]),
+                None => self.testbed.run_until(next, &mut []),
+            };
+            if let Err(error) = stepped {
+                self.failed = Some(error.to_string());
+                return Err(error);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Whether it is recorded: then it cannot go back.
+    pub fn is_recorded(&self) -> bool {
+        self.recorder.is_some()
+    }
+
+    /// Closes recording and subsystems; the summary where it was recorded.
+    ///
+    /// # Errors
+    /// A file that cannot be written, or a subsystem that fails at its end.
+    pub fn finish(self) -> Result<Option<Summary>> {
+        let Self { testbed, recorder, failed, .. } = self;
+        let time_s = testbed.t_s();
+        let error = failed.map(|message| Error::Simulation { time_s, message });
+        let summary = match recorder {
+            Some(mut recorder) => {
+                testbed.view(|view| recorder.finished(view, error.as_ref()))?;
+                let status = if error.is_some() { Status::Failed } else { Status::Done };
+                Some(recorder.finish(0.0, 0.0, error.as_ref(), status)?)
+            }
+            None => None,
+        };
+        testbed.close()?;
+        Ok(summary)
+    }
+}

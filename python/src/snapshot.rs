@@ -1,0 +1,39 @@
+//! States of testbeds that can be gone back to.
+
+use pyo3::prelude::*;
+use std::sync::{Arc, Mutex, PoisonError};
+use terraglue::testbed;
+
+/// Numbers of the states that a testbed can keep at a time.
+#[derive(Debug)]
+pub struct Places(Mutex<Vec<u32>>);
+
+impl Places {
+    /// Of so many states.
+    pub fn new(count: u32) -> Arc<Self> {
+        Arc::new(Self(Mutex::new((0..count).rev().collect())))
+    }
+
+    /// A free one; none: all are taken.
+    pub fn take(&self) -> Option<u32> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop()
+    }
+
+    fn give_back(&self, place: u32) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(place);
+    }
+}
+
+/// The state of a testbed at a communication point, kept while this lives.
+#[pyclass(frozen, module = "terraglue")]
+pub struct Snapshot {
+    pub state: testbed::Snapshot,
+    pub place: u32,
+    pub places: Arc<Places>,
+}
+
+impl Drop for Snapshot {
+    fn drop(&mut self) {
+        self.places.give_back(self.place);
+    }
+}

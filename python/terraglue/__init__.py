@@ -1,0 +1,33 @@
+"""Robots on deformable soil: rigid bodies, soils and controllers, glued into one run.
+
+    import terraglue
+
+    testbed = terraglue.Testbed("moon_walk", set={"soil.module": "soil-bekker"})
+    testbed.run_until(2.0)
+    print(testbed["robot.body.z"], testbed.unit("robot.body.z"))
+"""
+
+from . import errors
+from ._terraglue import Batch, Recording, Snapshot, Testbed, version
+from .errors import Error, InputError, ModuleError, SimulationError, UnknownName
+from .paths import MODELS, PROGRAM, SCENARIOS
+from .program import run
+
+__version__ = version()
+__all__ = [
+    "Batch",
+    "Error",
+    "InputError",
+    "MODELS",
+    "ModuleError",
+    "PROGRAM",
+    "Recording",
+    "SCENARIOS",
+    "SimulationError",
+    "Snapshot",
+    "Testbed",
+    "UnknownName",
+    "errors",
+    "run",
+    "version",
+]

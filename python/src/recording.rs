@@ -49,7 +49,7 @@ impl Recording {
     /// The scenario as text, after all edits.
     #[getter]
     fn scenario(&self) -> &str {
-        self.0.header.get("scenario")
+        self.0.header.get("scenario_text")
     }
 
     /// What happened: times (s) and words.

@@ -22,7 +22,7 @@ PAGES += sorted(str(p.relative_to(ROOT)) for folder in ("docs", "docs/plugins") 
 PAGES += sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs/examples").glob("*.py"))
 PAGES += sorted(str(p.relative_to(ROOT)) for p in (ROOT / "scenarios").glob("*.toml"))
 # subcommands whose help has examples are found by their help
-HELPS = ["", "run", "compare", "report", "check", "check-module", "modules", "variables", "fmu run", "fmu info", "fmu check", "export",
+HELPS = ["", "run", "compare", "sweep", "report", "check", "check-module", "modules", "variables", "fmu run", "fmu info", "fmu check", "export",
          "convert", "new", "fit-soil", "robot", "soils"]
 
 # What is not run, by its beginning, and why. What stands here and in no page is an error, too.
@@ -48,6 +48,7 @@ NOT_RUN = {
     "terraglue video": "needs a browser; test_page.py makes videos where there is one",
     "terraglue run --resume": "needs a run that was broken off; test_checkpoints.py breaks runs off and resumes them",
     "pip install": "needs a network",
+    "pip wheel": "needs a network; test_package.py builds the wheel where there is one",
     "python3 -m venv": "needs a network",
     "target/robots/bin/python": "needs a network",
     "python mujoco_on_soil.py": "needs MuJoCo and matplotlib",
@@ -186,6 +187,8 @@ def short(part):
             part += " --set time.settle_s=0"
         if words[1] == "compare" and "--strategies" not in words:
             part += " --strategies cooperative,iterative"
+    if words[:2] == ["terraglue", "sweep"] and words[2] not in ("run", "collect"):
+        part += " --set time.duration_s=0.02"
     if words[:2] == ["terraglue", "check-module"] and "--list" not in words and "--level" not in words:
         part += " --level quick"
     return part.replace("--set event=[] ", "--set 'event=[]' ")

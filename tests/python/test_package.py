@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import PROGRAM, ROOT
 
 PLATE = {
     "time": {"step_s": 0.001, "duration_s": 0.2},
@@ -27,20 +28,33 @@ PLATE = {
 }
 
 
+def wheel(place):
+    """The wheel as pip builds it, of what the tests have built."""
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
+    environment = {**os.environ, "TERRAGLUE_PROFILE": "debug"}
+    done = subprocess.run([*pip, "wheel", "--no-deps", "-w", place, ROOT / "python"], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-4000:]
+    (made,) = place.glob("terraglue-*-abi3-*.whl")
+    return made
+
+
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    """The folder with the installed package, built from what the tests have built."""
-    place = tmp_path_factory.mktemp("wheel")
-    environment = {**os.environ, "TERRAGLUE_PROFILE": "debug"}
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
-    done = subprocess.run([*pip, "wheel", "--no-deps", "-w", place, ROOT / "python"], env=environment, capture_output=True, text=True)
-    if done.returncode and "No matching distribution found for maturin" in done.stderr:
-        pytest.skip("maturin cannot be installed here")
-    assert done.returncode == 0, done.stderr[-4000:]
-    (wheel,) = place.glob("terraglue-*-abi3-*.whl")
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(place / "site")
-    return place / "site"
+    """The folder with the installed package. Building the wheel compiles for minutes, so it is put together of what the tests have built;
+    with TERRAGLUE_TEST_WHEEL=1 it is what the wheel holds."""
+    place = tmp_path_factory.mktemp("package")
+    folder = place / "site"
+    if os.environ.get("TERRAGLUE_TEST_WHEEL"):
+        with zipfile.ZipFile(wheel(place)) as archive:
+            archive.extractall(folder)
+        return folder
+    shutil.copytree(ROOT / "python/terraglue", folder / "terraglue", ignore=shutil.ignore_patterns("data", "*.so", "__pycache__"))
+    built = pathlib.Path(PROGRAM).parent
+    shutil.copy(built / "lib_terraglue.so", folder / "terraglue/_terraglue.abi3.so")
+    lay_out = ["cargo", "run", "--quiet", "--package", "xtask-start", "--", "install", folder / "terraglue/data", "--built", built.name]
+    done = subprocess.run(lay_out, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder
 
 
 @pytest.fixture(scope="session")

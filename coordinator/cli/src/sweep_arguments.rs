@@ -33,11 +33,11 @@ pub struct SweepArguments {
 
 const EXAMPLES: &str = "\
 Examples:
-  terraglue sweep scenarios/rover_sweep.toml -o runs/slopes      writes the list of cases
+  terraglue sweep scenarios/rover_slope.toml -o runs/slopes      writes the list of cases
   terraglue sweep run runs/slopes -j 8                           does what is missing; stop it and start it at will
   terraglue sweep collect runs/slopes                            sweep.csv and sweep.html
-  terraglue sweep scenarios/rover_sweep.toml -o runs/slopes --commands | parallel -j 8
-  terraglue sweep scenarios/rover_sweep.toml -o runs/slopes --slurm | sbatch";
+  terraglue sweep scenarios/rover_slope.toml -o runs/slopes --commands | parallel -j 8
+  terraglue sweep scenarios/rover_slope.toml -o runs/slopes --slurm | sbatch";
 
 /// What can be done with a sweep.
 #[derive(Subcommand, Debug, Clone)]

@@ -12,6 +12,9 @@ use terraglue::recording;
 /// Times (s) and values.
 type Series<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
+/// Times (s) and a pose in each row.
+type Poses<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
 /// A recording, also one that was cut off.
 #[pyclass(frozen, module = "terraglue")]
 pub struct Recording(recording::Recording);
@@ -78,11 +81,7 @@ impl Recording {
     }
 
     /// Times (s), and x, y, z (m) with the quaternion w, x, y, z of a frame in each row.
-    fn poses<'py>(
-        &self,
-        py: Python<'py>,
-        frame: &str,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn poses<'py>(&self, py: Python<'py>, frame: &str) -> PyResult<Poses<'py>> {
         let Some(poses) = self.0.poses.get(frame) else {
             return Err(self.unknown(py, "frame", frame, self.0.poses.keys().cloned()));
         };

@@ -164,13 +164,13 @@ fn known(testbed: &Testbed, scenario: &Scenario, names: &[String]) -> Result {
     testbed.view(|view| summary.started(view))?;
     let keys = keys(&summary.summary(0.0, 0.0, None, Status::Done));
     let variables = testbed.signals().directory.names();
-    for name in names.iter().filter(|name| !keys.contains(name) && testbed.read(name).is_none()) {
-        let all = variables.iter().chain(&keys).map(String::as_str);
-        let message =
-            format!("sweep.collect: `{name}` is no variable that is a number, and no key of summary.json");
-        return Err(InputError::plain(message, did_you_mean(name, all)).into());
-    }
-    Ok(())
+    let Some(name) = names.iter().find(|name| !keys.contains(name) && testbed.read(name).is_none()) else {
+        return Ok(());
+    };
+    let all = variables.iter().chain(&keys).map(String::as_str);
+    let message =
+        format!("sweep.collect: `{name}` is no variable that is a number, and no key of summary.json");
+    Err(InputError::plain(message, did_you_mean(name, all)).into())
 }
 
 /// Writes table and page of what is there, and says so.

@@ -412,11 +412,10 @@ impl Subsystem for FmuSubsystem {
         let of_step =
             if self.step_feeds_through { Capabilities::STEP_FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
-        let derivatives =
-            match self.instance.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives() {
-                true => Capabilities::DERIVATIVES,
-                false => Capabilities::default(),
-            };
+        let derivatives = match c.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives() {
+            true => Capabilities::DERIVATIVES,
+            false => Capabilities::default(),
+        };
         let slopes =
             if c.output_derivatives { Capabilities::OUTPUT_DERIVATIVES } else { Capabilities::default() };
         retry | bytes | force | through | of_step | fixed | derivatives | slopes
@@ -517,7 +516,7 @@ impl Subsystem for FmuSubsystem {
         out: &mut [f64],
     ) -> Result {
         let (mut z, mut v) = (Vec::new(), Vec::new());
-        if !self.instance.tells_derivatives()
+        if !self.instance.description().capabilities.tells_derivatives()
             || !self.collect(unknowns, &mut z)?
             || !self.collect(knowns, &mut v)?
         {

@@ -70,6 +70,15 @@ impl CallWatch {
     }
 }
 
+/// What derivatives are taken by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// A variable.
+    Variable(u32),
+    /// Simulated time: per second.
+    Time,
+}
+
 impl Instance {
     /// Takes a subsystem under supervision; `name` is that of the scenario.
     pub fn new(name: &str, module: &str, kind: Kind, subsystem: Box<dyn Subsystem>) -> Self {
@@ -440,46 +449,30 @@ impl Instance {
         reply(&self.supervision, "set", result)
     }
 
-    /// d(unknowns)/d(known) of f64 variables where the subsystem knows it; false where it must be tried.
+    /// Derivatives of f64 variables by another one or by time, where the subsystem knows them; false where it does not.
     ///
     /// # Errors
     /// [`Error::Module`]: the subsystem failed, or failed for good before.
-    pub fn derivative(&self, unknowns: &[u32], known: u32, out: &mut [f64]) -> Result<bool> {
-        const NAME: &str = "directional_derivative";
-        self.supervision.alive(NAME)?;
-        let mut of_element = unknowns.iter().chain([&known]);
+    pub fn derivatives(&self, of: &[u32], by: By, out: &mut [f64]) -> Result<bool> {
+        let (name, known) = match by {
+            By::Variable(id) => ("directional_derivative", Some(id)),
+            By::Time => ("output_derivatives", None),
+        };
+        self.supervision.alive(name)?;
+        let mut of_element = of.iter().chain(&known);
         if self.elements().is_some_and(|e| of_element.any(|id| e.has(*id))) {
             return Ok(false);
         }
         out.fill(f64::NAN);
-        match self.subsystem.directional_derivative(unknowns, &[known], &[1.0], out) {
+        let told = match known {
+            Some(id) => self.subsystem.directional_derivative(of, &[id], &[1.0], out),
+            None => self.subsystem.output_derivatives(of, out),
+        };
+        match told {
             Err(Failure::Unsupported) => Ok(false),
             result => {
-                self.supervision.outcome(NAME, result)?;
+                self.supervision.outcome(name, result)?;
                 Ok(out.iter().all(|x| x.is_finite()))
-            }
-        }
-    }
-
-    /// Derivatives of outputs by time, per second; false: they are not known.
-    ///
-    /// # Errors
-    /// [`Error::Module`]: the subsystem failed, or failed for good before, or told NaN.
-    pub fn output_derivatives(&self, ids: &[u32], out: &mut [f64]) -> Result<bool> {
-        const NAME: &str = "output_derivatives";
-        self.supervision.alive(NAME)?;
-        if self.elements().is_some_and(|e| ids.iter().any(|id| e.has(*id))) {
-            return Ok(false);
-        }
-        out.fill(f64::NAN);
-        match self.subsystem.output_derivatives(ids, out) {
-            Err(Failure::Unsupported) => Ok(false),
-            result => {
-                self.supervision.outcome(NAME, result)?;
-                match out.iter().all(|x| x.is_finite()) {
-                    true => Ok(true),
-                    false => Err(self.error(NAME, "a derivative is no number".to_owned())),
-                }
             }
         }
     }

@@ -37,7 +37,7 @@ mod workers;
 pub use allocations::AllocationCounter;
 pub use description::Description;
 pub use error::LoadError;
-pub use instance::{Instance, Progress, Reply, message, observe, shape_visibility};
+pub use instance::{By, Instance, Progress, Reply, message, observe, shape_visibility};
 pub use isolation::Isolation;
 pub use library::{
     AvailableModule, FmuFactory, Library, ListedModule, LoadedModule, available_modules, described,

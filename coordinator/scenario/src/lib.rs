@@ -34,6 +34,7 @@ mod source;
 pub mod ssp;
 mod subsystems;
 mod sweep;
+mod sweep_plan;
 mod terrain;
 #[cfg(test)]
 mod tests;
@@ -49,5 +50,5 @@ pub use set::split as split_set;
 pub use soil_row::{find_soil_table, read_soil_table};
 pub use soil_table::{COLUMNS, SoilRow, SoilTable, TableError};
 pub use source::Source;
-pub use sweep::SweepPlan;
+pub use sweep_plan::SweepPlan;
 pub use terraglue_diagnostics::{Complaint, InputError, allowed_values, check_value, did_you_mean, nearest};

@@ -14,6 +14,9 @@ const BOTTOM: f64 = 22.0;
 const SPACE: f64 = 150.0;
 const MARGIN: f64 = 75.0;
 
+/// The place of a case on an axis.
+type Place = Box<dyn Fn(&Row) -> Option<f64>>;
+
 /// What an axis shows.
 struct Axis {
     title: String,
@@ -21,7 +24,7 @@ struct Axis {
     words: Vec<String>,
     low: f64,
     high: f64,
-    value: Box<dyn Fn(&Row) -> Option<f64>>,
+    value: Place,
 }
 
 /// The diagram of the cases that have figures; none of fewer than two axes or cases.
@@ -71,7 +74,7 @@ fn of_figure(name: &str, rows: &[&Row]) -> Option<Axis> {
 }
 
 /// An axis over the values of all rows; none where they are all equal.
-fn axis(title: String, rows: &[&Row], value: Box<dyn Fn(&Row) -> Option<f64>>) -> Option<Axis> {
+fn axis(title: String, rows: &[&Row], value: Place) -> Option<Axis> {
     let values = rows.iter().filter_map(|row| value(row)).filter(|x| x.is_finite());
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     (low < high).then_some(Axis { title, words: Vec::new(), low, high, value })

@@ -8,7 +8,7 @@ use super::stream_link::{self, StreamLink};
 use super::table;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::Recall;
-use terraglue_host::{Instance, Reply};
+use terraglue_host::{By, Instance, Reply};
 use terraglue_scenario::{Connection, ConnectionOrder, Extrapolate, InputError, Source};
 use terraglue_subsystem::unit::Unit;
 use terraglue_subsystem::{Capabilities, Causality, ValueType, Values, ValuesMut};
@@ -80,8 +80,8 @@ impl Link {
             let mut slopes = None;
             if line.by_derivatives() && moment.nominal > 0 && line.is_fresh(moment) {
                 let (source, mut told) = (&instances[self.from], vec![0.0; n]);
-                if !source.output_derivatives(&self.ids[..n], &mut told)? {
-                    let why = "it tells no derivatives of these outputs".to_owned();
+                if !source.derivatives(&self.ids[..n], By::Time, &mut told)? {
+                    let why = "it tells no derivatives of these outputs, or NaN".to_owned();
                     return Err(source.error("output_derivatives", why));
                 }
                 told.iter_mut().zip(&self.numbers[n..2 * n]).for_each(|(slope, factor)| *slope *= factor);
@@ -137,7 +137,11 @@ impl Link {
     pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
         let mut out = vec![0.0; self.count()];
         if self.from == other.to {
-            if !instances[self.from].derivative(self.output_ids(), other.input_ids()[k], &mut out)? {
+            if !instances[self.from].derivatives(
+                self.output_ids(),
+                By::Variable(other.input_ids()[k]),
+                &mut out,
+            )? {
                 return Ok(None);
             }
             out.iter_mut().enumerate().for_each(|(k, x)| *x *= self.conversion(k).0);

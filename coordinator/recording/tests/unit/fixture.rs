@@ -301,6 +301,7 @@ pub fn scenario(strategy: &str) -> Scenario {
             joint: Some("robot.LF_j2".into()),
         },
         page: Default::default(),
+        sweep: None,
         subsystems: vec![part("gait", "gait"), part("robot", "rigid-body"), part("soil", "soil-bekker")],
         glue: Vec::new(),
         connections: Vec::new(),

@@ -107,6 +107,13 @@ pub struct Capabilities {
     pub output_derivatives: bool,
 }
 
+impl Capabilities {
+    /// Whether derivatives of outputs by inputs are known: directional or adjoint ones.
+    pub fn tells_derivatives(self) -> bool {
+        self.directional_derivatives || self.adjoint_derivatives
+    }
+}
+
 /// What an FMU wants to be run with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {

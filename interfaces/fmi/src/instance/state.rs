@@ -174,12 +174,6 @@ impl FmuInstance {
         }
     }
 
-    /// Whether derivatives of outputs are known: directional or adjoint ones.
-    pub fn tells_derivatives(&self) -> bool {
-        let c = self.description.capabilities;
-        c.directional_derivatives || c.adjoint_derivatives
-    }
-
     /// d(unknowns)/d(knowns)·seed, all of type f64 and no arrays; from adjoint derivatives row by row where the FMU
     /// offers no directional ones.
     ///

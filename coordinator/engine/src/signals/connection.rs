@@ -24,6 +24,8 @@ pub struct Link {
     to: usize,
     /// When within a step it passes values.
     order: ConnectionOrder,
+    /// Whether its target is stepped after its source, with the values at the end of the step.
+    within: bool,
     /// Of the outputs, then of the inputs.
     ids: Vec<u32>,
     /// Values, then a and then b of value_to = a·value_from + b.
@@ -57,12 +59,15 @@ impl Link {
         self.write(instances, &self.numbers[..self.count()])
     }
 
-    /// The same at the start of a step: inputs that are not held follow their line.
+    /// The same at the start of a step: inputs that are not held follow their line, and those that get their values within the step wait.
     ///
     /// # Errors
     /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem refuses the values or fails.
     #[inline]
     pub fn pass_on_ahead(&self, instances: &mut [Instance]) -> Result {
+        if self.within {
+            return Ok(());
+        }
         match self.extrapolation.as_ref().and_then(|line| line.ahead()) {
             None => self.pass_on(instances),
             Some(ahead) => self.write(instances, ahead),
@@ -202,6 +207,11 @@ impl Link {
     /// Whether it may pass values within a step where that avoids a delay.
     pub fn is_ordered(&self) -> bool {
         self.order == ConnectionOrder::Structure
+    }
+
+    /// Says that its target is stepped after its source.
+    pub fn pass_within_the_step(&mut self) {
+        self.within = true;
     }
 
     /// Whether the step is repeated until its values stand.
@@ -428,7 +438,8 @@ impl Resolving<'_> {
             let line = || Extrapolation::new(multiples, takes_end, by_derivatives);
             let extrapolation = (extrapolate != Extrapolate::Constant).then(|| Box::new(line()));
             let (ids, numbers) = (Vec::new(), Vec::new());
-            links.push(Link { from: from.slot, to: to.slot, order, ids, numbers, extrapolation });
+            let within = false;
+            links.push(Link { from: from.slot, to: to.slot, order, within, ids, numbers, extrapolation });
             links.len() - 1
         });
         let link = &mut links[k];

@@ -95,7 +95,7 @@ impl Testbed {
         }
         let streams = Streams::new(&subsystems.instances);
         let Subsystems { instances, schedules, .. } = &mut subsystems;
-        let order = StepOrder::new(&signals.links, &signals.faults, instances, schedules);
+        let order = StepOrder::new(&mut signals.links, &signals.faults, instances, schedules);
         let loops =
             Loops::new(&signals.links, &signals.faults, instances, schedules, (&order, services.slots - 1))
                 .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;

@@ -25,9 +25,9 @@ struct Passed {
 }
 
 impl StepOrder {
-    /// Orders the FMUs of a run and writes their levels into their schedules.
+    /// Orders the FMUs of a run and writes their levels into their schedules, and into the connections which of them wait for the end of a step.
     pub fn new(
-        links: &Links,
+        links: &mut Links,
         faults: &Faults,
         instances: &[Instance],
         schedules: &mut [StepSchedule],
@@ -56,6 +56,7 @@ impl StepOrder {
         order.levels.resize_with(level.iter().max().map_or(1, |l| l + 1), Passed::default);
         for (k, [from, to]) in numbers.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {
             debug_assert!(level[from] < level[to]);
+            links.numbers[k].pass_within_the_step();
             order.levels[level[to]].numbers.push(k);
         }
         for (k, [_, to]) in discrete.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {

@@ -27,12 +27,13 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
 
 /// An FMU of FMI 3.0 from the C beside this file.
 fn three(place: &Path, name: &str, variables: &str, outputs: &str, macros: &[&str]) -> Outcome<PathBuf> {
+    let grid = if macros.is_empty() { "" } else { " fixedInternalStepSize=\"0.01\"" };
     let library = place.join(format!("{name}.so"));
     let mut compile = command("cc", &["-O2", "-shared", "-fPIC", "-w", "-o"]);
     must(compile.arg(&library).arg(root().join(SOURCE)).args(macros).arg("-lm"))?;
     let text = format!(
         "<?xml version=\"1.0\"?><fmiModelDescription fmiVersion=\"3.0\" modelName=\"{name}\" instantiationToken=\"g\">\
-         <CoSimulation modelIdentifier=\"m\" canHandleVariableCommunicationStepSize=\"true\"/><ModelVariables>\
+         <CoSimulation modelIdentifier=\"m\" canHandleVariableCommunicationStepSize=\"true\"{grid}/><ModelVariables>\
          <Float64 name=\"time\" valueReference=\"0\" causality=\"independent\" variability=\"continuous\"/>{variables}</ModelVariables>\
          <ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
     );

@@ -14,6 +14,9 @@ use terraglue::{Error, Result};
 /// States that a testbed can keep at a time.
 pub const MOST_SNAPSHOTS: u32 = 64;
 
+/// Steps between two looks at the clock.
+const TOGETHER: u32 = 8;
+
 /// See above.
 pub struct Run {
     pub testbed: Testbed,
@@ -48,6 +51,21 @@ impl Run {
         Ok(Self { testbed, scenario, places: Places::new(MOST_SNAPSHOTS), recorder, failed: None })
     }
 
+    /// Makes steps, for `slice` of wall time at most; how many are left.
+    ///
+    /// # Errors
+    /// The simulation stops, now or before.
+    pub fn make_steps(&mut self, count: u32, slice: Duration) -> Result<u32> {
+        let (step_s, begin) = (self.scenario.time.step_s, Instant::now());
+        let mut left = count;
+        while left > 0 && begin.elapsed() < slice {
+            let some = left.min(TOGETHER);
+            self.run_until(self.testbed.t_s() + f64::from(some) * step_s, Duration::MAX)?;
+            left -= some;
+        }
+        Ok(left)
+    }
+
     /// Steps up to a time, for `slice` of wall time at most; whether it is there.
     ///
     /// # Errors
@@ -63,8 +81,7 @@ impl Run {
             if begin.elapsed() >= slice {
                 return Ok(false);
             }
-            // several steps at a time, so that the clock is read rarely
-            let next = (self.testbed.t_s() + 8.0 * step_s).min(until_s);
+            let next = (self.testbed.t_s() + f64::from(TOGETHER) * step_s).min(until_s);
             let stepped = match &mut self.recorder {
                 Some(recorder) => self.testbed.run_until(next, &mut [recorder]),
                 None => self.testbed.run_until(next, &mut []),

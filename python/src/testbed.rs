@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use terraglue::Result;
 
 /// Wall time after which Python is asked for signals such as Ctrl-C.
 const SLICE: Duration = Duration::from_millis(50);
@@ -43,11 +44,14 @@ impl Testbed {
         }
     }
 
-    fn run_to(&self, py: Python<'_>, until: impl Fn(&Run) -> f64 + Send + Sync) -> PyResult<()> {
-        let until_s = self.with(py, |_, run| Ok(until(run)))?;
+    /// Steps in slices of wall time, between which Python is asked for signals, until nothing is left.
+    fn in_slices(
+        &self,
+        py: Python<'_>,
+        mut slice: impl FnMut(&mut Run) -> Result<bool> + Send,
+    ) -> PyResult<()> {
         loop {
-            let stepped = py.detach(|| self.lock().as_mut().map(|run| run.run_until(until_s, SLICE)));
-            match stepped {
+            match py.detach(|| self.lock().as_mut().map(&mut slice)) {
                 None => return Err(errors::ended(py, "the testbed")),
                 Some(Err(error)) => return Err(errors::of(py, &error)),
                 Some(Ok(true)) => return Ok(()),
@@ -116,10 +120,14 @@ impl Testbed {
         self.with(py, |py, run| Ok(names::describe(py, &run.testbed, name)?.help.clone()))
     }
 
-    /// Makes n communication steps.
+    /// Makes n communication steps; of several threads each makes its own.
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, n: u32) -> PyResult<()> {
-        self.run_to(py, |run| run.testbed.t_s() + f64::from(n) * run.scenario.time.step_s)
+        let mut left = n;
+        self.in_slices(py, |run| {
+            left = run.make_steps(left, SLICE)?;
+            Ok(left == 0)
+        })
     }
 
     /// Steps up to a time, s.
@@ -127,7 +135,7 @@ impl Testbed {
         if !t.is_finite() {
             return Err(errors::refused(py, format!("run_until: {t} is no time")));
         }
-        self.run_to(py, |_| t)
+        self.in_slices(py, |run| run.run_until(t, SLICE))
     }
 
     /// Committed values of variables, in their units.

@@ -6,7 +6,7 @@
 use crate::run::Run;
 use crate::scenario::{load, module_paths};
 use crate::snapshot::Snapshot;
-use crate::testbed::matrix;
+use crate::testbed::{matrix, write};
 use crate::{errors, names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
@@ -238,12 +238,7 @@ impl Batch {
         for (k, member) in self.members.iter().enumerate() {
             let mut member = locked(member);
             let Some(run) = member.run.as_mut() else { continue };
-            for (name, value) in names.iter().zip(values.row(k)).filter(|(_, value)| !value.is_nan()) {
-                run.testbed.set(name, &serde_json::Value::from(*value)).map_err(|error| match error {
-                    terraglue::Error::Simulation { message, .. } => errors::refused(py, message),
-                    other => errors::of(py, &other),
-                })?;
-            }
+            write(py, run, &names, &values.row(k).to_vec())?;
         }
         Ok(())
     }

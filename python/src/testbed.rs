@@ -5,7 +5,7 @@ use crate::run::{MOST_SNAPSHOTS, Run};
 use crate::scenario::{load, module_paths, value_of};
 use crate::snapshot::Snapshot;
 use crate::{errors, names};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
@@ -149,6 +149,12 @@ impl Testbed {
         Ok(values.to_pyarray(py))
     }
 
+    /// Sets variables to numbers, which take effect in the next step; NaN leaves a value as it is.
+    fn write(&self, py: Python<'_>, names: Vec<String>, values: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let values = values.as_array().to_vec();
+        self.with(py, |py, run| write(py, run, &names, &values))
+    }
+
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<f64> {
         self.with(py, |py, run| {
             let variable = names::find(py, &run.testbed, name)?;
@@ -287,6 +293,22 @@ impl Testbed {
     fn __exit__(&self, py: Python<'_>, _error: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
         self.finish(py).map(drop)
     }
+}
+
+/// Sets variables of a run.
+pub fn write(py: Python<'_>, run: &mut Run, names: &[String], values: &[f64]) -> PyResult<()> {
+    if names.len() != values.len() {
+        let message = format!("write: {} numbers are wanted, one for each name", names.len());
+        return Err(errors::refused(py, message));
+    }
+    names::find_all(py, &run.testbed, names)?;
+    for (name, value) in names.iter().zip(values).filter(|(_, value)| !value.is_nan()) {
+        run.testbed.set(name, &serde_json::Value::from(*value)).map_err(|error| match error {
+            terraglue::Error::Simulation { message, .. } => errors::refused(py, message),
+            other => errors::of(py, &other),
+        })?;
+    }
+    Ok(())
 }
 
 fn numbers(state: &terraglue::subsystem::BodyState) -> Vec<f64> {

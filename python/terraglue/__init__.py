@@ -12,6 +12,7 @@ from ._terraglue import Batch, Recording, Snapshot, Testbed, version
 from .errors import Error, InputError, ModuleError, SimulationError, UnknownName
 from .paths import MODELS, PROGRAM, SCENARIOS
 from .program import run
+from .soil import Soil
 
 __version__ = version()
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "SCENARIOS",
     "SimulationError",
     "Snapshot",
+    "Soil",
     "Testbed",
     "UnknownName",
     "errors",

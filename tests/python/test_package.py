@@ -288,3 +288,85 @@ def test_the_stubs_know_everything_that_is_there(tg, site):
         body = text.split(f"class {cls.__name__}:")[1].split("\nclass ")[0]
         public = [name for name in vars(cls) if not name.startswith("_")]
         assert public and all(f"def {name}(" in body for name in public), cls
+
+
+def test_a_mass_of_ones_own_comes_to_rest_on_the_soil(tg):
+    # a sphere of 10 cm under 2 kg, with dynamics of its own in steps of the soil
+    mass, radius, h = 2.0, 0.1, 1e-3
+    soil = tg.Soil([[0.0, 0.0, radius]], radius_m=radius, step_s=h, terrain={"kind": "flat", "size_m": [1.0, 1.0], "spacing_m": 0.005})
+    z, v, force = radius, 0.0, 0.0
+    for _ in range(1500):
+        v += h * (force / mass - 9.81 - 20.0 * v)
+        z += h * v
+        wrench, _ = soil.step([[0.0, 0.0, z]])
+        force = wrench[0, 2]
+    assert force == pytest.approx(mass * 9.81, rel=0.02) and abs(v) < 1e-3
+    x, y, ground = soil.heights(-0.2, 0.2, -0.2, 0.2)
+    assert ground.min() == pytest.approx(z - radius, abs=1e-3) and z < radius
+
+
+def test_a_trial_leaves_nothing_and_derivatives_are_those_of_the_force(tg):
+    place = np.array([[0.0, 0.0, 0.03], [0.5, 0.2, 0.03]])
+    soil = tg.Soil(place, parameters="dry_sand_LLL_K010", terrain={"kind": "flat", "size_m": [2.0, 1.0], "spacing_m": 0.005})
+    for _ in range(10):
+        place[:, 2] -= 2e-4
+        force, moment = soil.step(place)
+    assert force.shape == moment.shape == (2, 3) and (force[:, 2] > 0).all()
+    deeper = place - [0.0, 0.0, 1e-4]
+    tried, _ = soil.trial(deeper)
+    again, _ = soil.trial(deeper)
+    assert np.array_equal(tried, again)
+    slope = soil.derivatives(deeper)
+    # pressed deeper, the ground pushes more; a smaller step by hand agrees
+    assert (slope[:, 2, 2] < 0).all()
+    by_hand = (soil.trial(deeper + [0.0, 0.0, 1e-7])[0] - soil.trial(deeper - [0.0, 0.0, 1e-7])[0])[:, 2] / 2e-7
+    assert slope[:, 2, 2] == pytest.approx(by_hand, rel=1e-3)
+    assert np.array_equal(soil.step(deeper)[0], tried)
+    for wrong in ([[0.0, 0.0, 0.0]], [[0.0, 0.0, float("nan")]] * 2, [[0.0, 0.0]] * 2):
+        with pytest.raises(ValueError, match="position"):
+            soil.step(wrong)
+
+
+def test_a_dragged_foot_of_a_soil_takes_as_much_work_as_it_gives_heat(tg):
+    soil = tg.Soil([[0.0, 0.0, 0.03]], module="soil-cellular-automaton", terrain={"kind": "flat", "size_m": [1.0, 0.4], "spacing_m": 0.005})
+    place, work = np.array([0.0, 0.0, 0.03]), 0.0
+    for k in range(300):
+        before = place.copy()
+        place = place + (np.array([0.0, 0.0, -1e-4]) if k < 100 else np.array([2e-4, 0.0, 0.0]))
+        force, _ = soil.step(place[None])
+        work -= float(force[0] @ (place - before))
+    energy = soil.testbed.energy()
+    kept = energy["dissipated"] + energy["potential"]
+    assert work > 0.1 and kept == pytest.approx(work, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["MoonWalk", "RoverSlope"])
+def test_environments_pass_the_checker_and_are_repeatable(tg, name):
+    gymnasium = pytest.importorskip("gymnasium", reason="gymnasium cannot be installed here")
+    from gymnasium.utils.env_checker import check_env
+
+    import terraglue.gym
+
+    small = {"period_s": 0.02, "duration_s": 0.1}
+    env = terraglue.gym.environment(name, **small)
+    with __import__("warnings").catch_warnings():
+        __import__("warnings").simplefilter("ignore")
+        check_env(env, skip_render_check=True)
+    actions = [env.action_space.sample() for _ in range(5)]
+
+    def episode(seed):
+        rows = [env.reset(seed=seed)[0]]
+        for action in actions:
+            observed, reward, fallen, over, info = env.step(action)
+            rows.append(observed)
+        assert over and not fallen and np.isfinite(reward) and info["energy_j"] >= 0
+        return np.array(rows)
+
+    assert np.array_equal(episode(3), episode(3))
+    if name == "MoonWalk":
+        assert not np.array_equal(episode(3), episode(4))
+    env.close()
+    made = gymnasium.make(f"terraglue/{name}-v0")
+    assert made.action_space.shape == env.action_space.shape
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        terraglue.gym.environment(name).step(actions[0])

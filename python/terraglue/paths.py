@@ -1,5 +1,6 @@
 """Where the wheel keeps the program, its scenarios and models."""
 
+import os
 import pathlib
 
 DATA = pathlib.Path(__file__).resolve().parent / "data"
@@ -11,6 +12,9 @@ MODULES = DATA / "lib" / "terraglue"
 SCENARIOS = DATA / "share" / "terraglue" / "scenarios"
 #: Folder of robots and soils that come with the program.
 MODELS = DATA / "share" / "terraglue" / "models"
+
+# the soil table of the package is found by scenarios that lie elsewhere
+os.environ.setdefault("TERRAGLUE_SHARE", str(DATA / "share" / "terraglue"))
 
 
 def scenario(name):

@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import pickle
+import re
 import shutil
 import signal
 import subprocess
@@ -370,3 +371,16 @@ def test_environments_pass_the_checker_and_are_repeatable(tg, name):
     assert made.action_space.shape == env.action_space.shape
     with pytest.raises(gymnasium.error.ResetNeeded):
         terraglue.gym.environment(name).step(actions[0])
+
+
+@pytest.mark.parametrize("page", ["docs/python.md", "README.md"])
+def test_what_a_page_shows_runs(tg, site, tmp_path, page):
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(), re.M | re.S)
+    assert blocks
+    code = "\n".join(blocks).replace("64", "3")
+    if "terraglue.gym" in code:
+        pytest.importorskip("gymnasium", reason="gymnasium cannot be installed here")
+    with tg.Testbed("moon_walk", set={"time.duration_s": 0.05}, out=tmp_path / "runs/moon_walk") as testbed:
+        testbed.run_until(0.05)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(site)}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -8,8 +8,12 @@ use std::path::{Path, PathBuf};
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::did_you_mean;
 
+/// Variable with the folder `share/terraglue` of an installation, for programs that are not its own: the interpreter of Python.
+const SHARE: &str = "TERRAGLUE_SHARE";
+
 /// The soil table beside a scenario: `models/soils.csv` or `../models/soils.csv` from its folder, the nearer first, that of the
-/// current folder, that of the installation, or that of the sources from whose `target` folder the program runs.
+/// current folder, that of the installation (`TERRAGLUE_SHARE`, or beside the program), or that of the sources from whose `target` folder the
+/// program runs.
 pub fn find_soil_table(folder: &Path) -> Option<PathBuf> {
     let program = std::env::current_exe().ok();
     let program = program.as_deref().and_then(Path::parent);
@@ -18,7 +22,8 @@ pub fn find_soil_table(folder: &Path) -> Option<PathBuf> {
         .filter_map(|p| Some(program?.join(p)));
     let near = ["models/soils.csv", "../models/soils.csv"].map(|p| folder.join(p));
     let here = Some(PathBuf::from("models/soils.csv"));
-    near.into_iter().chain(here).chain(beside_program).find(|path| path.is_file())
+    let share = std::env::var_os(SHARE).map(|share| PathBuf::from(share).join("models/soils.csv"));
+    near.into_iter().chain(here).chain(share).chain(beside_program).find(|path| path.is_file())
 }
 
 /// Whether the rows of a soil table have a number of this name.

@@ -84,9 +84,10 @@ fn groups<'a>(all: &'a Collected, k: usize, rows: &[&'a Row]) -> Vec<(String, f6
     if groups.len() > MOST_VALUES {
         let mut sorted: Vec<&Row> = rows.to_vec();
         sorted.sort_by(|a, b| place(a).total_cmp(&place(b)));
-        let size = sorted.len().div_ceil(GROUPS).max(FEWEST);
-        groups = sorted
-            .chunks(size)
+        let count = (sorted.len() / FEWEST).clamp(1, GROUPS);
+        let bound = |k: usize| k * sorted.len() / count;
+        groups = (0..count)
+            .map(|k| &sorted[bound(k)..bound(k + 1)])
             .map(|rows| {
                 let (low, high) = (place(rows[0]), place(rows[rows.len() - 1]));
                 let mean = rows.iter().map(|row| place(row)).sum::<f64>() / rows.len() as f64;

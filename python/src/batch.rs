@@ -28,7 +28,7 @@ struct Member {
 }
 
 /// Variables whose values an array follows.
-struct Bound2 {
+struct Followed {
     variables: Vec<VariableRef>,
     array: Py<PyArray2<f64>>,
 }
@@ -38,7 +38,7 @@ struct Bound2 {
 pub struct Batch {
     members: Vec<Mutex<Member>>,
     threads: usize,
-    bound: Mutex<Vec<Bound2>>,
+    bound: Mutex<Vec<Followed>>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -222,7 +222,7 @@ impl Batch {
     fn bind<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let variables = self.find(py, &names)?;
         let array = matrix(py, self.members.len(), self.values(&variables))?;
-        locked(&self.bound).push(Bound2 { variables, array: array.clone().unbind() });
+        locked(&self.bound).push(Followed { variables, array: array.clone().unbind() });
         Ok(array)
     }
 

@@ -144,6 +144,16 @@ def test_values_that_do_not_fit_are_cases_that_say_so(tmp_path):
     assert "Cases that did not reach their end" in (tmp_path / "sweep/sweep.html").read_text()
 
 
+def test_several_processes_share_a_sweep(whole, tmp_path):
+    listed(tmp_path)
+    both = [subprocess.Popen([PROGRAM, "sweep", "run", "sweep", "-j", "2", "--quiet"], cwd=tmp_path, stdout=subprocess.DEVNULL) for _ in range(2)]
+    assert {process.wait() for process in both} <= {0, 1}
+    # one may have ended while the other still ran its last cases
+    assert terraglue("sweep", "collect", "sweep", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "sweep/sweep.csv").read_bytes() == whole[1] and recordings(tmp_path) == recordings(whole[0])
+    assert not list(tmp_path.glob("sweep/cases/*.lock"))
+
+
 def test_ctrl_c_leaves_what_is_done_and_no_process(tmp_path):
     plan = PLAN.replace("seeds = 2", "seeds = 40")
     listed(tmp_path, plan)

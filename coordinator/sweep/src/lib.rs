@@ -8,6 +8,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod claim;
 mod collect;
 mod folder;
 mod outcome;
@@ -16,6 +17,7 @@ mod parallel;
 mod points;
 mod statistics;
 
+pub use claim::Claim;
 pub use collect::{Collected, Row, collect};
 pub use folder::{CASES, Case, PAGE, RESULTS, Settings, Sweep};
 pub use outcome::{CaseStatus, Outcome, figures, keys};

@@ -4,13 +4,13 @@ use crate::interrupt::Interrupt;
 use crate::progress::{self, Progress, Waiting};
 use crate::scenario_arguments::ScenarioArguments;
 use crate::sweep_arguments::SweepRunArguments;
-use crate::{Exit, apart, exit_of, folder, run, show, soil_module, testbed};
+use crate::{Exit, apart, exit_of, run, show, soil_module, testbed};
 use std::path::Path;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::testbed::Testbed;
 use terraglue_recording::Status;
 use terraglue_scenario::Scenario;
-use terraglue_sweep::{Case, CaseStatus, Outcome, Sweep, figures};
+use terraglue_sweep::{Case, CaseStatus, Claim, Outcome, Sweep, figures};
 
 /// Runs the case that the arguments name; nothing where it is done.
 pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
@@ -24,8 +24,13 @@ pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
     if Outcome::is_there(&place) {
         return Ok(Exit::Done);
     }
-    // another process that works on it would lose its files
-    folder::free(&place)?;
+    let Some(_claim) = Claim::take(&sweep, case)? else {
+        eprintln!("error: another process runs case {}", case.number);
+        return Ok(Exit::Failed);
+    };
+    if Outcome::is_there(&place) {
+        return Ok(Exit::Done);
+    }
     emptied(&place)?;
     let (scenario, testbed) = match made(&sweep, case, &interrupt) {
         Ok(made) => made,

@@ -11,7 +11,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use terraglue_diagnostics::{Error, Result};
-use terraglue_sweep::{Case, CaseStatus, Outcome, Sweep};
+use terraglue_sweep::{Case, CaseStatus, Claim, Outcome, Sweep};
 
 /// Bytes that are kept of what a case says.
 const MOST_SAID: u64 = 1 << 18;
@@ -65,7 +65,10 @@ pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
     let all = super::collected(&sweep, false)?;
     let unlike = all.rows.len() - all.count("done");
     if all.missing() > 0 {
-        eprintln!("error: {} cases were killed; `terraglue sweep run` runs them", all.missing());
+        let n = all.missing();
+        eprintln!(
+            "error: {n} cases were killed, or another process runs them; `terraglue sweep run` does what is missing"
+        );
     }
     Ok(if unlike > 0 { Exit::Failed } else { Exit::Done })
 }
@@ -124,6 +127,7 @@ fn one(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result {
     if Outcome::is_there(&folder) || cancel.load(Ordering::Relaxed) || was_killed(status) {
         return Ok(());
     }
+    let Some(_claim) = Claim::take(sweep, case)? else { return Ok(()) };
     let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default();
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let reason = format!("the process ended without a result ({status}): {last}");

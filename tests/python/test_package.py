@@ -241,7 +241,10 @@ def test_threads_may_share_a_testbed(tg):
 
 def test_ctrl_c_ends_a_long_run(site, tmp_path):
     code = "import terraglue\nt = terraglue.Testbed('moon_walk', set={'time.duration_s': 1000.0})\nprint('ready', flush=True)\nt.run_until(1000.0)\n"
-    process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(site)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # what runs in the background of a shell has it ignored
+    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    process = subprocess.Popen([sys.executable, "-c", code], env=environment, preexec_fn=heard, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)

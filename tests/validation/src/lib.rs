@@ -142,9 +142,13 @@ pub fn validate(arguments: &Arguments) -> Outcome {
         return again_in_release(arguments);
     }
     let profile = if no_timing { "debug" } else { "release" };
-    let build: &[&str] = if no_timing { &["build"] } else { &["build", "--release"] };
+    // in the development profile as the tests build it: with fewer packages the features of dependencies differ, and they are built twice
+    let build: &[&str] = match no_timing {
+        true => &["build", "--workspace"],
+        false => &["build", "--release", "--package", "terraglue-cli", "--package", "terraglue-fmu-library"],
+    };
     if arguments.table.is_none() {
-        must(cargo(build).args(["--package", "terraglue-cli", "--package", "terraglue-fmu-library"]))?;
+        must(&mut cargo(build))?;
     }
     let part = arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone());
     let table = arguments.table.clone();

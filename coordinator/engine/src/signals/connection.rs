@@ -214,6 +214,11 @@ impl Link {
         self.within = true;
     }
 
+    /// Whether its target is stepped after its source: then nothing is passed at the start of a step.
+    pub fn is_within_the_step(&self) -> bool {
+        self.within
+    }
+
     /// Whether the step is repeated until its values stand.
     pub fn is_iterated(&self) -> bool {
         self.order == ConnectionOrder::Iterate

@@ -73,12 +73,12 @@ impl Signals {
         self.write(instances)
     }
 
-    /// Reads all outputs. None is passed on before all are read, so that direct feed-through cannot leak values of the same step.
+    /// Reads all outputs but those that are passed within the step. None is passed on before all are read, so that direct feed-through cannot leak values of the same step.
     ///
     /// # Errors
     /// A value that is no number, has no entry in the `map` of its connection, or that a module cannot give.
     pub fn read(&mut self, instances: &[Instance]) -> Result {
-        for link in &mut self.links.numbers {
+        for link in self.links.numbers.iter_mut().filter(|link| !link.is_within_the_step()) {
             link.read(instances)?;
         }
         self.links.discrete.iter_mut().try_for_each(|l| l.read(instances))

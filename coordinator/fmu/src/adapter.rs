@@ -400,25 +400,19 @@ fn unsaved(why: FmiError) -> Error {
 impl Subsystem for FmuSubsystem {
     fn capabilities(&self) -> Capabilities {
         let c = self.instance.description().capabilities;
-        let retry = if self.can_go_back {
-            Capabilities::RETRY | Capabilities::STATE
-        } else {
-            Capabilities::default()
-        };
-        let bytes =
-            if c.serialize && !self.clocks { Capabilities::SERIALIZE } else { Capabilities::default() };
-        let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
-        let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
-        let of_step =
-            if self.step_feeds_through { Capabilities::STEP_FEEDTHROUGH } else { Capabilities::default() };
-        let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
-        let derivatives = match c.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives() {
-            true => Capabilities::DERIVATIVES,
-            false => Capabilities::default(),
-        };
-        let slopes =
-            if c.output_derivatives { Capabilities::OUTPUT_DERIVATIVES } else { Capabilities::default() };
-        retry | bytes | force | through | of_step | fixed | derivatives | slopes
+        let derivatives = c.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives();
+        let all = [
+            (self.can_go_back, Capabilities::RETRY | Capabilities::STATE),
+            (c.serialize && !self.clocks, Capabilities::SERIALIZE),
+            (!self.bodies.is_empty(), Capabilities::FORCE),
+            (self.feeds_through, Capabilities::FEEDTHROUGH),
+            (self.step_feeds_through, Capabilities::STEP_FEEDTHROUGH),
+            (!c.variable_step, Capabilities::FIXED_STEP),
+            (derivatives, Capabilities::DERIVATIVES),
+            (c.output_derivatives, Capabilities::OUTPUT_DERIVATIVES),
+        ];
+        let own = all.into_iter().filter(|(has, _)| *has).map(|(_, what)| what);
+        own.fold(Capabilities::default(), |set, what| set | what)
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {

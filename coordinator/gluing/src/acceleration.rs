@@ -19,6 +19,8 @@ pub struct Acceleration {
     kind: Relaxation,
     /// Factor of the first residual.
     start: f64,
+    /// Whether nothing is known from before.
+    first: bool,
     r: Vec<f64>,
     step: Vec<f64>,
     /// Residual and x of the iteration before.
@@ -41,6 +43,7 @@ impl Acceleration {
         Self {
             kind,
             start,
+            first: true,
             r: Vec::new(),
             step: Vec::new(),
             r_old: Vec::new(),
@@ -55,13 +58,19 @@ impl Acceleration {
         }
     }
 
+    /// Forgets all that is known from before.
+    pub fn begin(&mut self) {
+        self.first = true;
+    }
+
     /// Buffer of the residual, which is written before [`Acceleration::step`] is asked.
     pub fn residual(&mut self) -> &mut Vec<f64> {
         &mut self.r
     }
 
-    /// The change of x; `first`: nothing is known from before.
-    pub fn step(&mut self, first: bool, x: &[f64]) -> &[f64] {
+    /// The change of x.
+    pub fn step(&mut self, x: &[f64]) -> &[f64] {
+        let first = std::mem::take(&mut self.first);
         self.step.clear();
         match self.kind {
             Relaxation::None => self.step.extend_from_slice(&self.r),
@@ -218,7 +227,7 @@ mod tests {
             }
             way.residual().clear();
             way.residual().extend(r);
-            let step = way.step(k == 0, &x);
+            let step = way.step(&x);
             x.iter_mut().zip(step).for_each(|(x, d)| *x += d);
         }
         200

@@ -52,6 +52,7 @@ impl Strategy for Relaxed {
 
     fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
         problem.start_from_last();
+        self.acceleration.begin();
         problem.report.xt_form = true;
         let (mut size, mut at_start) = (f64::INFINITY, f64::INFINITY);
         for iteration in 0..self.limits.max_iterations {
@@ -71,7 +72,7 @@ impl Strategy for Relaxed {
                     self.kind
                 )));
             }
-            let step = self.acceleration.step(iteration == 0, &problem.t);
+            let step = self.acceleration.step(&problem.t);
             problem.t.iter_mut().zip(step).for_each(|(t, d)| *t += d);
         }
         Ok(Outcome::NotConverged(format!(

@@ -59,15 +59,12 @@ impl Link {
         self.write(instances, &self.numbers[..self.count()])
     }
 
-    /// The same at the start of a step: inputs that are not held follow their line, and those that get their values within the step wait.
+    /// The same at the start of a step: inputs that are not held follow their line.
     ///
     /// # Errors
     /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem refuses the values or fails.
     #[inline]
     pub fn pass_on_ahead(&self, instances: &mut [Instance]) -> Result {
-        if self.within {
-            return Ok(());
-        }
         match self.extrapolation.as_ref().and_then(|line| line.ahead()) {
             None => self.pass_on(instances),
             Some(ahead) => self.write(instances, ahead),
@@ -80,21 +77,17 @@ impl Link {
     /// [`Error::Module`](terraglue_diagnostics::Error::Module): the source cannot tell a derivative that it has promised.
     #[inline]
     pub fn extrapolate(&mut self, moment: Moment, instances: &[Instance]) -> Result {
-        if let Some(line) = &mut self.extrapolation {
-            let n = self.ids.len() / 2;
-            let mut slopes = None;
-            if line.by_derivatives() && moment.nominal > 0 && line.is_fresh(moment) {
-                let (source, mut told) = (&instances[self.from], vec![0.0; n]);
-                if !source.derivatives(&self.ids[..n], By::Time, &mut told)? {
-                    let why = "it tells no derivatives of these outputs, or NaN".to_owned();
-                    return Err(source.error("output_derivatives", why));
-                }
-                told.iter_mut().zip(&self.numbers[n..2 * n]).for_each(|(slope, factor)| *slope *= factor);
-                slopes = Some(told);
+        let Some(line) = &mut self.extrapolation else { return Ok(()) };
+        let n = self.ids.len() / 2;
+        let source = &instances[self.from];
+        line.take(moment, &self.numbers[..n], |slopes| {
+            if !source.derivatives(&self.ids[..n], By::Time, slopes)? {
+                let why = "it tells no derivatives of these outputs, or NaN".to_owned();
+                return Err(source.error("output_derivatives", why));
             }
-            line.take(moment, &self.numbers[..n], slopes.as_deref());
-        }
-        Ok(())
+            slopes.iter_mut().zip(&self.numbers[n..2 * n]).for_each(|(slope, factor)| *slope *= factor);
+            Ok(())
+        })
     }
 
     /// What its inputs follow.

@@ -20,6 +20,8 @@ pub struct Discrete {
     conversion: Option<(f64, f64)>,
     /// Whether it may pass values within a step.
     order: ConnectionOrder,
+    /// Whether its target is stepped after its source, with the value at the end of the step.
+    within: bool,
     value: Value,
 }
 
@@ -62,12 +64,22 @@ impl Discrete {
         order: ConnectionOrder,
     ) -> Self {
         let conversion = Some(conversion).filter(|c| *c != (1.0, 0.0));
-        Self { from, to, table, conversion, order, value: Value::Whole(0) }
+        Self { from, to, table, conversion, order, within: false, value: Value::Whole(0) }
     }
 
     /// Whether it may pass values within a step where that avoids a delay.
     pub fn is_ordered(&self) -> bool {
         self.order == ConnectionOrder::Structure
+    }
+
+    /// Says that its target is stepped after its source.
+    pub fn pass_within_the_step(&mut self) {
+        self.within = true;
+    }
+
+    /// Whether its target is stepped after its source: then nothing is passed at the start of a step.
+    pub fn is_within_the_step(&self) -> bool {
+        self.within
     }
 
     /// Whether values change on their way.

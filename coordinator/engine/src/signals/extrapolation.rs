@@ -6,6 +6,7 @@
 //! make steps of different lengths (`step_multiple`): the line runs through the last two values of the source, and the mean is taken over the
 //! step of the target.
 
+use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::{Recall, Remember};
 
 /// What an input that goes from `start` to `end` within a step is held at: the end where outputs follow inputs at once, else the mean.
@@ -61,33 +62,42 @@ impl Extrapolation {
         }
     }
 
-    /// What the source tells its slopes for.
+    /// Whether the source tells its slopes.
     pub fn by_derivatives(&self) -> bool {
         self.by_derivatives
     }
 
     /// Whether the source has made a step since its values were taken last.
-    pub fn is_fresh(&self, moment: Moment) -> bool {
+    fn is_fresh(&self, moment: Moment) -> bool {
         let now = moment.nominal / self.multiples[0];
         self.last_s.is_nan()
             || if self.multiples[0] == 1 { moment.t > self.last_s } else { now != self.seen[0] }
     }
 
-    /// Takes the values at the start of a communication step, and their slopes where the source has told them.
-    pub fn take(&mut self, moment: Moment, values: &[f64], slopes: Option<&[f64]>) {
+    /// Takes the values at the start of a communication step; `tell` writes the slopes, and is asked where they are wanted and the source
+    /// has made a step.
+    ///
+    /// # Errors
+    /// What `tell` returns.
+    pub fn take(
+        &mut self,
+        moment: Moment,
+        values: &[f64],
+        tell: impl FnOnce(&mut [f64]) -> Result,
+    ) -> Result {
         let Moment { t, h, nominal } = moment;
         let now = self.multiples.map(|n| nominal / n);
         let first = self.last_s.is_nan();
         if self.is_fresh(moment) {
             self.slope.resize(values.len(), 0.0);
-            for (slope, (value, last)) in self.slope.iter_mut().zip(values.iter().zip(&self.last)) {
-                *slope = (value - last) / (t - self.last_s);
-            }
-            if self.by_derivatives {
+            match self.by_derivatives {
+                true if nominal > 0 => tell(&mut self.slope)?,
                 // before its first step a source has none
-                match slopes {
-                    Some(slopes) => self.slope.copy_from_slice(slopes),
-                    None => self.slope.fill(0.0),
+                true => self.slope.fill(0.0),
+                false => {
+                    for (slope, (value, last)) in self.slope.iter_mut().zip(values.iter().zip(&self.last)) {
+                        *slope = (value - last) / (t - self.last_s);
+                    }
                 }
             }
             self.last.clear();
@@ -105,6 +115,7 @@ impl Extrapolation {
         let takes_end = self.takes_end;
         ahead.extend(line(t + h).zip(&*start).map(|(end, start)| held(takes_end, *start, end)));
         self.seen = now;
+        Ok(())
     }
 
     /// What the inputs are set to; `None` before the first step.
@@ -134,13 +145,18 @@ mod tests {
 
     const H: f64 = 0.1;
 
+    /// Takes values whose slopes nobody is asked for.
+    fn take(line: &mut Extrapolation, moment: Moment, value: f64) {
+        line.take(moment, &[value], |_| panic!("no slope is wanted")).expect("taken");
+    }
+
     /// What the inputs are set to at the last of some steps, of a source with the value u(t) in its own last step.
     fn ahead(multiples: [u32; 2], takes_end: bool, steps: u64, u: impl Fn(f64) -> f64) -> f64 {
         let mut line = Extrapolation::new(multiples, takes_end, false);
         let source = u64::from(multiples[0]);
         for nominal in 0..steps {
             let told = (nominal / source * source) as f64 * H;
-            line.take(Moment { t: nominal as f64 * H, h: H, nominal }, &[u(told)], None);
+            take(&mut line, Moment { t: nominal as f64 * H, h: H, nominal }, u(told));
         }
         line.ahead().map_or(f64::NAN, |all| all[0])
     }
@@ -163,19 +179,24 @@ mod tests {
     fn the_first_step_and_a_step_that_is_repeated_have_no_other_line() {
         assert_eq!(ahead([1, 1], false, 1, |t| 1.0 + t), 1.0);
         let mut line = Extrapolation::new([1, 1], true, false);
-        line.take(Moment { t: 0.0, h: H, nominal: 0 }, &[1.0], None);
-        line.take(Moment { t: H, h: H, nominal: 1 }, &[2.0], None);
-        line.take(Moment { t: H, h: 0.5 * H, nominal: 1 }, &[2.0], None);
+        take(&mut line, Moment { t: 0.0, h: H, nominal: 0 }, 1.0);
+        take(&mut line, Moment { t: H, h: H, nominal: 1 }, 2.0);
+        take(&mut line, Moment { t: H, h: 0.5 * H, nominal: 1 }, 2.0);
         assert!((line.ahead().map_or(f64::NAN, |all| all[0]) - 2.5).abs() < 1e-12);
     }
 
     #[test]
     fn slopes_that_are_told_are_the_line_and_the_first_step_is_held() {
         let mut line = Extrapolation::new([1, 1], false, true);
-        line.take(Moment { t: 0.0, h: H, nominal: 0 }, &[1.0], None);
+        take(&mut line, Moment { t: 0.0, h: H, nominal: 0 }, 1.0);
         assert_eq!(line.ahead(), Some(&[1.0][..]));
         // the last two values have another slope
-        line.take(Moment { t: H, h: H, nominal: 1 }, &[2.0], Some(&[3.0]));
+        let moment = Moment { t: H, h: H, nominal: 1 };
+        let tell = |slopes: &mut [f64]| {
+            slopes.fill(3.0);
+            Ok(())
+        };
+        line.take(moment, &[2.0], tell).expect("taken");
         assert!((line.ahead().map_or(f64::NAN, |all| all[0]) - (2.0 + 3.0 * 0.5 * H)).abs() < 1e-12);
     }
 }

@@ -81,18 +81,21 @@ impl Signals {
         for link in self.links.numbers.iter_mut().filter(|link| !link.is_within_the_step()) {
             link.read(instances)?;
         }
-        self.links.discrete.iter_mut().try_for_each(|l| l.read(instances))
+        let mut discrete = self.links.discrete.iter_mut().filter(|link| !link.is_within_the_step());
+        discrete.try_for_each(|link| link.read(instances))
     }
 
-    /// Sets all inputs to what was read.
+    /// Sets the inputs to what was read.
     ///
     /// # Errors
     /// A value that a module refuses.
     pub fn write(&mut self, instances: &mut [Instance]) -> Result {
-        for link in &self.links.numbers {
+        for link in self.links.numbers.iter().filter(|link| !link.is_within_the_step()) {
             link.pass_on_ahead(instances)?;
         }
-        self.links.discrete.iter().try_for_each(|l| l.pass_on(instances))?;
+        for link in self.links.discrete.iter().filter(|link| !link.is_within_the_step()) {
+            link.pass_on(instances)?;
+        }
         self.links.streams.iter_mut().try_for_each(|l| l.pass_on(instances))
     }
 

@@ -96,9 +96,8 @@ impl Testbed {
         let streams = Streams::new(&subsystems.instances);
         let Subsystems { instances, schedules, .. } = &mut subsystems;
         let order = StepOrder::new(&mut signals.links, &signals.faults, instances, schedules);
-        let loops =
-            Loops::new(&signals.links, &signals.faults, instances, schedules, (&order, services.slots - 1))
-                .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
+        let loops = Loops::new(&signals.links, &signals.faults, instances, schedules, services.slots - 1)
+            .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
         Ok(Self {
             exact: takes_parts(scenario, &subsystems.instances),
             subsystems,

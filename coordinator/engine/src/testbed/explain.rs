@@ -2,7 +2,6 @@
 
 use super::Testbed;
 use super::group::Group;
-use super::loops::Loops;
 use super::schedule::StepSchedule;
 use super::step_order::StepOrder;
 use crate::signals::{Links, VariableRef, streams};
@@ -46,7 +45,6 @@ impl Testbed {
             schedules: &self.subsystems.schedules,
             groups: &self.glued.groups,
             order: self.uncoupled.order(),
-            loops: self.uncoupled.loops(),
         };
         let ends = sight.ends();
         Explanation {
@@ -64,15 +62,14 @@ struct Sight<'a> {
     schedules: &'a [StepSchedule],
     groups: &'a [Group],
     order: &'a StepOrder,
-    loops: &'a Loops,
 }
 
 impl Sight<'_> {
     fn ends(&self) -> Vec<ConnectionEnds> {
-        let numbers = self.links.numbers.iter().enumerate().flat_map(|(k, link)| {
+        let numbers = self.links.numbers.iter().flat_map(|link| {
             let passes = match () {
-                () if self.order.is_within(k) => Passes::AtEnd,
-                () if self.loops.has(k) => Passes::Repeatedly,
+                () if link.is_within_the_step() => Passes::AtEnd,
+                () if link.is_iterated() => Passes::Repeatedly,
                 () => match link.extrapolates() {
                     Extrapolate::Constant => Passes::AtStart,
                     Extrapolate::Linear => Passes::AlongLine,
@@ -89,7 +86,7 @@ impl Sight<'_> {
             })
         });
         let variable = |at: VariableRef| (at.slot, at.describe(self.instances).id);
-        let discrete = self.links.discrete.iter().enumerate().map(|(k, d)| {
+        let discrete = self.links.discrete.iter().map(|d| {
             let [from, to] = d.ends().map(variable);
             ConnectionEnds {
                 from,
@@ -97,7 +94,7 @@ impl Sight<'_> {
                 conversion: d.conversion(),
                 by_table: d.has_table(),
                 stream: false,
-                passes: if self.order.is_discrete_within(k) { Passes::AtEnd } else { Passes::AtStart },
+                passes: if d.is_within_the_step() { Passes::AtEnd } else { Passes::AtStart },
             }
         });
         let places: Vec<_> = streams(self.instances).map(|(_, place)| place).collect();

@@ -9,7 +9,7 @@
 use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
-use crate::signals::{Faults, Links, held};
+use crate::signals::{Faults, Link, Links, held};
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::acceleration::Acceleration;
@@ -46,8 +46,6 @@ pub(super) struct Loops {
     start: Vec<f64>,
     guess: Vec<f64>,
     acceleration: Acceleration,
-    /// Whether no trial of the step was looked at yet.
-    first: bool,
 }
 
 impl Default for Loops {
@@ -59,7 +57,6 @@ impl Default for Loops {
             start: Vec::new(),
             guess: Vec::new(),
             acceleration: Acceleration::new(Relaxation::Anderson, 1.0),
-            first: true,
         }
     }
 }
@@ -74,7 +71,7 @@ impl Loops {
         faults: &Faults,
         instances: &[Instance],
         schedules: &[StepSchedule],
-        (order, state): (&StepOrder, u32),
+        state: u32,
     ) -> std::result::Result<Self, String> {
         let iterated = links.numbers.iter().enumerate().filter(|(_, link)| link.is_iterated());
         let follows = |slot: usize| instances[slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
@@ -87,8 +84,8 @@ impl Loops {
                 continue;
             }
             loops.members.push(slot);
-            let passes = |k: &usize| order.is_within(*k) && links.numbers[*k].slots()[0] == slot;
-            open.extend((0..links.numbers.len()).filter(passes).map(|k| links.numbers[k].slots()[1]));
+            let passes = |link: &&Link| link.is_within_the_step() && link.slots()[0] == slot;
+            open.extend(links.numbers.iter().filter(passes).map(|link| link.slots()[1]));
         }
         loops.members.sort_unstable();
         for slot in &loops.members {
@@ -113,11 +110,6 @@ impl Loops {
         self.links.is_empty()
     }
 
-    /// Whether a connection of numbers is solved here.
-    pub fn has(&self, link: usize) -> bool {
-        self.links.iter().any(|own| own.link == link)
-    }
-
     /// Keeps states and values at the start of the step; the first trial is made with the values of the start.
     pub fn begin(&mut self, links: &Links, instances: &mut [Instance]) -> Result {
         let values = |i: &Iterated| {
@@ -126,7 +118,7 @@ impl Loops {
         };
         self.start = self.links.iter().flat_map(values).collect();
         self.guess.clone_from(&self.start);
-        self.first = true;
+        self.acceleration.begin();
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
     }
 
@@ -171,7 +163,7 @@ impl Loops {
                 residual.push(value - guess);
             }
         }
-        let step = self.acceleration.step(std::mem::take(&mut self.first), &self.guess);
+        let step = self.acceleration.step(&self.guess);
         self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
         Ok(stands)
     }

@@ -54,12 +54,12 @@ impl StepOrder {
         let level = levels(instances.len(), &edges);
         let mut order = Self::default();
         order.levels.resize_with(level.iter().max().map_or(1, |l| l + 1), Passed::default);
-        for (k, [from, to]) in numbers.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {
-            debug_assert!(level[from] < level[to]);
+        for (k, [_, to]) in numbers.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {
             links.numbers[k].pass_within_the_step();
             order.levels[level[to]].numbers.push(k);
         }
         for (k, [_, to]) in discrete.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {
+            links.discrete[k].pass_within_the_step();
             order.levels[level[to]].discrete.push(k);
         }
         schedules.iter_mut().zip(&level).for_each(|(schedule, level)| schedule.level = *level as u32);
@@ -83,16 +83,6 @@ impl StepOrder {
             links.discrete[*k].pass_on(instances)?;
         }
         Ok(())
-    }
-
-    /// Whether a connection of numbers passes values within a step.
-    pub fn is_within(&self, link: usize) -> bool {
-        self.levels.iter().any(|passed| passed.numbers.contains(&link))
-    }
-
-    /// The same for a connection of another type.
-    pub fn is_discrete_within(&self, link: usize) -> bool {
-        self.levels.iter().any(|passed| passed.discrete.contains(&link))
     }
 }
 

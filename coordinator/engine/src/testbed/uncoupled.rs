@@ -38,11 +38,6 @@ impl Uncoupled {
         Self { workers, saved: [Duration::ZERO; 2], order, loops }
     }
 
-    /// The loops that are solved within a step.
-    pub fn loops(&self) -> &Loops {
-        &self.loops
-    }
-
     /// The order of the steps.
     pub fn order(&self) -> &StepOrder {
         &self.order

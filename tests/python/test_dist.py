@@ -60,7 +60,7 @@ def bare_root(unpacked, tmp_path):
         place.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(library, place)
     shutil.copytree(unpacked, root / "opt")
-    for name in ("dev", "proc", "tmp", "work"):
+    for name in ("dev", "proc", "tmp", "results"):
         (root / name).mkdir()
     if os.geteuid() != 0 or subprocess.run(["mount", "-t", "proc", "proc", root / "proc"], capture_output=True).returncode:
         pytest.skip("needs the right to mount /proc and to change the root folder")
@@ -80,10 +80,10 @@ def test_the_archive_runs_in_a_root_folder_with_the_c_library_alone(bare_root):
         return subprocess.run(["env", "-i", *program], capture_output=True, text=True, timeout=120)
 
     isolated = ["--set", "soil.isolate=true", "--set", "gait.isolate=true"]
-    walk = run("run", "/opt/share/terraglue/scenarios/moon_walk.toml", "--duration", "0.05", "--json", "--out", "/work/out", *isolated)
+    walk = run("run", "/opt/share/terraglue/scenarios/moon_walk.toml", "--duration", "0.05", "--json", "--out", "/results/walk", *isolated)
     assert walk.returncode == 0, walk.stderr
     assert json.loads(walk.stdout)["status"] == "done"
-    assert {"report.html", "recording.mcap", "summary.json"} <= {p.name for p in (root / "work/out").iterdir()}
+    assert {"report.html", "recording.mcap", "summary.json"} <= {p.name for p in (root / "results/walk").iterdir()}
     checked = run("check-module", "/opt/lib/terraglue/libsensor_plugin.so", "--level", "quick")
     assert checked.returncode == 0, checked.stdout + checked.stderr
 

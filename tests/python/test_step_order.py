@@ -23,17 +23,26 @@ def parts(tmp_path_factory):
     return folder
 
 
-def oscillate(parts, folder, more="", step=0.01, isolate=False):
-    """Largest distance in the last period of 2 s, m, and the row of the spring's input in exchange.json."""
-    apart = "isolate = true\n" if isolate else ""
+def sprung(parts, folder, step, to_spring="", to_mass="", more=""):
+    """Rows of 2 s of the mass on its spring; `to_spring` and `to_mass` stand in the connections, `more` with both FMUs."""
     (folder / "s.toml").write_text(
         f"[time]\nstep_s = {step}\nduration_s = 2.0\n"
-        f'[mass]\nfmu = "{parts}/mass.fmu"\n{apart}[a_spring]\nfmu = "{parts}/spring.fmu"\n{apart}'
-        f'[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\n{more}\n[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\n'
+        f'[mass]\nfmu = "{parts}/mass.fmu"\n{more}[a_spring]\nfmu = "{parts}/spring.fmu"\n{more}'
+        f'[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\n{to_spring}\n[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\n{to_mass}\n'
     )
     done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
     assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((folder / "out/variables.csv").open()))
+    return list(csv.DictReader((folder / "out/variables.csv").open()))
+
+
+def farthest(rows):
+    """Largest error of the position relative to the amplitude."""
+    return max(abs(float(r["mass.x"]) - 0.1 * math.cos(10 * float(r["t_s"]))) for r in rows) / 0.1
+
+
+def oscillate(parts, folder, more="", step=0.01, isolate=False):
+    """Largest distance in the last period of 2 s, m, and the row of the spring's input in exchange.json."""
+    rows = sprung(parts, folder, step, more, more="isolate = true\n" if isolate else "")
     late = [abs(float(row["mass.x"])) for row in rows if float(row["t_s"]) > 2.0 - 2 * math.pi / 10]
     notes = json.loads((folder / "out/exchange.json").read_text())["connections"]
     return max(late), next(n for n in notes if n["to"] == "a_spring.x"), rows
@@ -95,17 +104,8 @@ def test_a_loop_of_gains_is_one_step_late(tmp_path):
 def iterated(parts, folder, step):
     """Energies over 2 s, and the largest error of the position relative to the amplitude, with the loop of mass and spring solved in
     each step."""
-    (folder / "s.toml").write_text(
-        f"[time]\nstep_s = {step}\nduration_s = 2.0\n[mass]\nfmu = \"{parts}/mass.fmu\"\n[a_spring]\nfmu = \"{parts}/spring.fmu\"\n"
-        '[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\norder = "iterate"\n'
-        '[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\norder = "iterate"\n'
-    )
-    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((folder / "out/variables.csv").open()))
-    energies = [0.5 * float(r["mass.v"]) ** 2 + 50 * float(r["mass.x"]) ** 2 for r in rows]
-    errors = [abs(float(r["mass.x"]) - 0.1 * math.cos(10 * float(r["t_s"]))) for r in rows]
-    return energies, max(errors) / 0.1
+    rows = sprung(parts, folder, step, 'order = "iterate"', 'order = "iterate"')
+    return [0.5 * float(r["mass.v"]) ** 2 + 50 * float(r["mass.x"]) ** 2 for r in rows], farthest(rows)
 
 
 def test_a_loop_that_is_iterated_keeps_the_energy_and_is_of_second_order(parts, tmp_path):
@@ -169,15 +169,7 @@ def test_what_cannot_repeat_a_step_is_refused(tmp_path):
 
 def extrapolated(parts, folder, step, more="", extrapolate="linear"):
     """Largest error of the position in 2 s relative to the amplitude, where the force on the mass follows a line."""
-    (folder / "s.toml").write_text(
-        f"[time]\nstep_s = {step}\nduration_s = 2.0\n[mass]\nfmu = \"{parts}/mass.fmu\"\n[a_spring]\nfmu = \"{parts}/spring.fmu\"\n"
-        f'[[connect]]\nfrom = "mass.x"\nto = "a_spring.x"\n{more}\n'
-        f'[[connect]]\nfrom = "a_spring.f"\nto = "mass.f"\nextrapolate = "{extrapolate}"\n'
-    )
-    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((folder / "out/variables.csv").open()))
-    return max(abs(float(r["mass.x"]) - 0.1 * math.cos(10 * float(r["t_s"]))) for r in rows) / 0.1
+    return farthest(sprung(parts, folder, step, more, f'extrapolate = "{extrapolate}"'))
 
 
 def test_a_line_through_the_last_two_values_is_of_second_order(parts, tmp_path):

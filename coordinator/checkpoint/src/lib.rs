@@ -13,13 +13,13 @@ mod origin;
 
 use origin::Origin;
 use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::testbed::{Options, Testbed};
 use terraglue_host::Instance;
 use terraglue_recording::{
     CHECKPOINT, RECORDING, Recorder, RecorderOptions, RecorderState, SUMMARY, TimingRow, VARIABLES, at,
+    replace,
 };
 use terraglue_scenario::{InputError, Scenario};
 use terraglue_subsystem::bytes::{self, Block};
@@ -211,18 +211,6 @@ impl Keeper {
             log::warn!("{}: {e}", self.path.display());
         }
     }
-}
-
-/// Writes a file beside `path` and puts it in its place: at any moment there is one whole file.
-fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
-    let part = path.with_extension("part");
-    let written = File::create(&part).and_then(|mut file| {
-        file.write_all(content)?;
-        file.sync_data()
-    });
-    let replaced = written.and_then(|()| std::fs::rename(&part, path));
-    // a part of it is of no use
-    replaced.inspect_err(|_| drop(std::fs::remove_file(&part)))
 }
 
 /// Refuses a run whose state cannot be kept.

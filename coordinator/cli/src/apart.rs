@@ -1,4 +1,4 @@
-//! `terraglue fmu run --isolate`: the same command in a process of its own.
+//! Commands in a process of their own. `terraglue fmu run --isolate`: the same command in a process of its own.
 //!
 //! Its rows come through a pipe of their own, which stands where its standard input was; all else that it writes goes to standard
 //! error, within bounds. It notes the time of each row in a file, so the process that waits knows how far it has come and whether it
@@ -32,6 +32,12 @@ const DONE: &str = "TERRAGLUE_DONE";
 /// Whether another process waits for this one and tells how it ended.
 pub fn is_child() -> bool {
     std::env::var_os(DONE).is_some()
+}
+
+/// The file of this program; where it was replaced or removed since, what runs.
+pub fn own_program() -> PathBuf {
+    let own = std::env::current_exe().ok().filter(|program| program.is_file());
+    own.unwrap_or_else(|| "/proc/self/exe".into())
 }
 
 /// Ends with the process that waits for this one, whatever ends it.
@@ -116,7 +122,7 @@ fn send_rows(mut from: PipeReader, unread: Arc<AtomicBool>) -> JoinHandle<()> {
 
 /// The command again without `--isolate`, with a folder of its own and a pipe for its rows.
 fn started(folder: &Path, rows: PipeWriter) -> std::io::Result<Child> {
-    Command::new(std::env::current_exe()?)
+    Command::new(own_program())
         .args(std::env::args_os().skip(1).filter(|word| word != "--isolate"))
         .env("TMPDIR", folder)
         .env(DONE, folder.join(DONE))

@@ -7,7 +7,7 @@ use super::output::outln;
 use super::pace::Pace;
 use super::progress::{self, Progress, Waiting};
 use super::testbed::{build, options, set_back};
-use super::{Exit, exit_of, serve, show, soil_module, strict};
+use super::{Exit, apart, exit_of, serve, show, soil_module, strict};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terraglue_checkpoint::{Checkpoint, Keeper, Resumed, require_states};
@@ -78,8 +78,7 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let keeper =
         every_s.map(|every_s| Keeper::new(&folder, &scenario, &options, (every_s, csv))).transpose()?;
     let resumed = checkpoint.map(|checkpoint| checkpoint.restore(&mut testbed)).transpose()?;
-    let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
-    let bar = progress::bar(steps, arguments.quiet);
+    let bar = progress::bar(scenario.time.steps(), arguments.quiet);
     bar.inc(testbed.step_index());
     let waiting = Waiting::standing(arguments.quiet, &bar, options.standing.clone(), "");
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "").after(waiting);
@@ -158,13 +157,12 @@ fn reloader(command: &RunCommand, scenario: &Scenario, options: &Options) -> Res
     if !command.watch {
         return Ok(None);
     }
-    let own = std::env::current_exe().ok().filter(|program| program.is_file());
     let at = |(name, step): &(String, String)| match step.parse() {
         Ok(step) => Ok((name.clone(), step)),
         Err(_) => Err(InputError::plain(format!("--reload-at {name}={step}: that is no step"), None)),
     };
     let wanted = ReloadOptions {
-        program: own.unwrap_or_else(|| "/proc/self/exe".into()),
+        program: apart::own_program(),
         reset: command.reload_reset,
         at_steps: command.reload_at.iter().map(at).collect::<std::result::Result<_, _>>()?,
     };

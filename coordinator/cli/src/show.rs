@@ -7,6 +7,17 @@ use terraglue_diagnostics::Error;
 use terraglue_recording::{Energies, PrintDepth, Summary};
 use terraglue_scenario::{InputError, keys};
 
+/// An error with its way out, for a cell of a table.
+pub fn in_one_line(error: &Error) -> String {
+    match error {
+        Error::Input(input) => match &input.help {
+            Some(help) => format!("{input}; {help}"),
+            None => input.to_string(),
+        },
+        other => other.to_string(),
+    }
+}
+
 /// An error on standard error; wrong input with file, line and the offending text.
 pub fn error(error: &Error) {
     match error {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::observer::Observer;
-use terraglue_engine::testbed::Testbed;
+use terraglue_engine::testbed::{Options, Testbed};
 use terraglue_recording::{Status, SummaryObserver};
 use terraglue_scenario::{InputError, Scenario, SweepPlan, did_you_mean};
 use terraglue_sweep::{
@@ -99,7 +99,8 @@ fn tried(plan: &SweepPlan, points: &Points, sets: &[(String, String)], modules: 
     let of = |row: &[String]| -> Vec<(String, String)> {
         sets.iter().cloned().chain(points.keys.iter().cloned().zip(row.iter().cloned())).collect()
     };
-    let built = |row: &[String]| built(&plan.scenario, &of(row), modules);
+    let options = testbed::options_of(1, modules, &Arc::new(AtomicBool::new(false)));
+    let built = |row: &[String]| built(&plan.scenario, &of(row), &options);
     let (testbed, scenario) = built(first).map_err(|e| of_plan(plan, points, first, e))?;
     known(&testbed, &scenario, &plan.spec.collect)?;
     drop(testbed);
@@ -122,16 +123,16 @@ fn tried(plan: &SweepPlan, points: &Points, sets: &[(String, String)], modules: 
     Ok(())
 }
 
-fn built(scenario: &Path, sets: &[(String, String)], modules: &[PathBuf]) -> Result<(Testbed, Scenario)> {
+/// The scenario of a case with its testbed.
+fn built(scenario: &Path, sets: &[(String, String)], options: &Options) -> Result<(Testbed, Scenario)> {
     let arguments = ScenarioArguments {
         scenario: scenario.to_owned(),
         sets: sets.to_vec(),
-        module_path: modules.to_vec(),
+        module_path: options.module_paths.clone(),
     };
     let loaded = Scenario::load(scenario, sets)?;
     soil_module::check(&loaded, &arguments)?;
-    let options = testbed::options_of(1, modules, &Arc::new(AtomicBool::new(false)));
-    Ok((testbed::build(&loaded, &options)?, loaded))
+    Ok((testbed::build(&loaded, options)?, loaded))
 }
 
 /// An error of the first case, at the key whose edit it is about.

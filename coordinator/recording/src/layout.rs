@@ -1,6 +1,8 @@
 //! Names of the files in a results folder, and errors that carry them.
 
 use crate::space::RESERVE;
+use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
 
@@ -48,6 +50,21 @@ pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
         }
     }
     Ok(())
+}
+
+/// Writes a file beside `path` and puts it in its place: at any moment there is one whole file.
+///
+/// # Errors
+/// The file cannot be written; what was there stays.
+pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    let part = path.with_extension("part");
+    let written = File::create(&part).and_then(|mut file| {
+        file.write_all(content)?;
+        file.sync_data()
+    });
+    let replaced = written.and_then(|()| std::fs::rename(&part, path));
+    // a part of it is of no use
+    replaced.inspect_err(|_| drop(std::fs::remove_file(&part)))
 }
 
 /// Says which file an input/output error is about.

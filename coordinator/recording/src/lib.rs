@@ -82,7 +82,7 @@ pub use energies::Energies;
 pub use exchange::write_exchange;
 pub use inputs::fingerprints;
 pub use layout::{CHECKPOINT, FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
-pub use layout::{at, nanoseconds, other_at};
+pub use layout::{at, nanoseconds, other_at, replace};
 pub use mend::{has_end, mend};
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording, ground_cloud, ground_grid};

@@ -63,6 +63,13 @@ pub struct Time {
     pub settle_s: f64,
 }
 
+impl Time {
+    /// Communication steps of the whole run.
+    pub fn steps(&self) -> u64 {
+        (self.duration_s / self.step_s).round() as u64
+    }
+}
+
 /// `[world]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct World {

@@ -20,6 +20,7 @@ mod feed;
 mod ground;
 mod ground_mesh;
 mod hub;
+mod listener;
 mod live;
 mod page_host;
 mod past;

@@ -2,6 +2,7 @@
 //! one after another. Who does not know the address, with a number that nobody guesses in it, gets nothing.
 
 use crate::access::token;
+use crate::listener::listen;
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Path, Query, State};
@@ -9,10 +10,10 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde::Deserialize;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use terraglue_diagnostics::{Error, Result};
+use terraglue_diagnostics::Result;
 use terraglue_page::ASSETS;
 
 /// Posts that wait to be taken; the page waits with the next one.
@@ -62,16 +63,7 @@ impl PageHost {
     /// No port is free on this machine.
     pub fn start(document: String) -> Result<(Self, Receiver<Posted>)> {
         let at = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let failed = |source| Error::File { path: at.to_string(), source };
-        let listener = TcpListener::bind(at).map_err(failed)?;
-        listener.set_nonblocking(true).map_err(failed)?;
-        let own = listener.local_addr().map_err(failed)?;
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(1)
-            .thread_name("page")
-            .enable_all()
-            .build()
-            .map_err(failed)?;
+        let (listener, own, runtime) = listen(at, "page")?;
         let (posted, taken) = sync_channel(WAITING);
         let token = token();
         let address = format!("http://{own}/{token}/");

@@ -4,6 +4,7 @@ use crate::access::Access;
 use crate::beside::Beside;
 use crate::connection::{Connection, LARGEST};
 use crate::hub::Hub;
+use crate::listener::listen;
 use crate::past;
 use crate::protocol::{self, Welcome};
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
@@ -14,10 +15,10 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Extension, Router};
 use serde::Deserialize;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
-use terraglue_diagnostics::{Error, Result};
+use terraglue_diagnostics::Result;
 use terraglue_page::ASSETS;
 
 /// How often the ground is looked at for tiles that have changed.
@@ -58,16 +59,7 @@ impl Server {
         access: Access,
         mut welcome: Welcome,
     ) -> Result<Self> {
-        let failed = |source| Error::File { path: address.to_string(), source };
-        let listener = TcpListener::bind(address).map_err(failed)?;
-        listener.set_nonblocking(true).map_err(failed)?;
-        let own = listener.local_addr().map_err(failed)?;
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(1)
-            .thread_name("serve")
-            .enable_all()
-            .build()
-            .map_err(failed)?;
+        let (listener, own, runtime) = listen(address, "serve")?;
         welcome.session = crate::access::token();
         let shared = Shared { hub, access: Arc::new(access), welcome, beside };
         let ground = Arc::clone(&shared.hub);

@@ -1,12 +1,12 @@
 //! One table of all cases: their values, how they ended, and their figures.
 
-use crate::folder::{RESULTS, Sweep};
+use crate::folder::{RESULTS, Sweep, write_table};
 use crate::outcome::{CaseStatus, Outcome};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use terraglue_diagnostics::did_you_mean;
 use terraglue_diagnostics::error::Result;
-use terraglue_recording::{at, other_at};
+use terraglue_recording::other_at;
 
 /// Figures that are shown first where a plan names none and cases have them.
 const USUAL: [&str; 6] = [
@@ -113,11 +113,10 @@ pub fn collect(sweep: &Sweep) -> Result<Collected> {
 
 fn write(sweep: &Sweep, all: &Collected) -> Result {
     let path = sweep.folder().join(RESULTS);
-    let partial = sweep.folder().join(format!("{RESULTS}.partial"));
-    let mut writer = csv::Writer::from_path(&partial).map_err(other_at(&partial))?;
+    let mut writer = csv::Writer::from_writer(Vec::new());
     let titles = ["case"].into_iter().chain(all.keys.iter().map(String::as_str));
     let titles = titles.chain(["status", "reason"]).chain(all.figures.iter().map(String::as_str));
-    writer.write_record(titles).map_err(other_at(&partial))?;
+    writer.write_record(titles).map_err(other_at(&path))?;
     for row in &all.rows {
         let reason = row.outcome.as_ref().and_then(|o| o.reason.as_deref()).unwrap_or_default();
         let figure = |name: &String| row.figure(name).map(|x| format!("{x:?}")).unwrap_or_default();
@@ -125,10 +124,9 @@ fn write(sweep: &Sweep, all: &Collected) -> Result {
             .chain(row.values.iter().cloned())
             .chain([row.status().to_owned(), reason.replace('\n', "; ")])
             .chain(all.figures.iter().map(figure));
-        writer.write_record(fields).map_err(other_at(&partial))?;
+        writer.write_record(fields).map_err(other_at(&path))?;
     }
-    writer.flush().map_err(at(&partial))?;
-    std::fs::rename(&partial, &path).map_err(at(&path))
+    write_table(&path, writer)
 }
 
 #[cfg(test)]

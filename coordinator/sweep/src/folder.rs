@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_recording::{at, other_at};
+use terraglue_recording::{at, other_at, replace};
 
 /// The list of cases: their number and the value of each varied key, with tabs between.
 pub const CASES: &str = "cases.tsv";
@@ -82,18 +82,15 @@ impl Sweep {
     }
 
     fn write_list(&self) -> Result {
-        let (path, partial) = (self.folder.join(CASES), self.folder.join(format!("{CASES}.partial")));
-        let mut writer =
-            csv::WriterBuilder::new().delimiter(b'\t').from_path(&partial).map_err(other_at(&partial))?;
-        let row = |writer: &mut csv::Writer<std::fs::File>, first: &str, others: &[String]| {
-            writer.write_record([first].into_iter().chain(others.iter().map(String::as_str)))
-        };
-        row(&mut writer, NUMBER, &self.keys).map_err(other_at(&partial))?;
+        let path = self.folder.join(CASES);
+        let mut table = csv::WriterBuilder::new().delimiter(b'\t').from_writer(Vec::new());
+        let first = [NUMBER.to_owned()].into_iter().chain(self.keys.iter().cloned());
+        table.write_record(first).map_err(other_at(&path))?;
         for case in &self.cases {
-            row(&mut writer, &case.number.to_string(), &case.values).map_err(other_at(&partial))?;
+            let row = [case.number.to_string()].into_iter().chain(case.values.iter().cloned());
+            table.write_record(row).map_err(other_at(&path))?;
         }
-        writer.flush().map_err(at(&partial))?;
-        std::fs::rename(&partial, &path).map_err(at(&path))
+        write_table(&path, table)
     }
 
     /// The sweep of a folder.
@@ -175,6 +172,12 @@ impl Sweep {
     pub fn missing(&self) -> impl Iterator<Item = &Case> {
         self.cases.iter().filter(|case| !Outcome::is_there(&self.case_folder(case)))
     }
+}
+
+/// Puts a table in its place.
+pub(crate) fn write_table(path: &Path, table: csv::Writer<Vec<u8>>) -> Result {
+    let bytes = table.into_inner().map_err(|e| other_at(path)(e.to_string()))?;
+    replace(path, &bytes).map_err(at(path))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use terraglue_diagnostics::error::Result;
-use terraglue_recording::{Summary, at, other_at};
+use terraglue_recording::{Summary, at, other_at, replace};
 
 /// Name of the file.
 const FILE: &str = "case.json";
@@ -60,11 +60,10 @@ impl Outcome {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, folder: &Path) -> Result {
-        let (path, partial) = (folder.join(FILE), folder.join(format!("{FILE}.partial")));
+        let path = folder.join(FILE);
         let mut text = serde_json::to_string_pretty(self).map_err(other_at(&path))?;
         text.push('\n');
-        std::fs::write(&partial, text).map_err(at(&partial))?;
-        std::fs::rename(&partial, &path).map_err(at(&path))
+        replace(&path, text.as_bytes()).map_err(at(&path))
     }
 
     /// That of a folder; none where the case is still to be run.
@@ -86,8 +85,8 @@ impl Outcome {
     }
 }
 
-/// Keys of a summary that depend on the machine and its load, not on the case.
-const MACHINE: [&str; 5] = ["wall_s", "cpu_s", "real_time_factor", "cpu_real_time_factor", "cpu_per_step_s"];
+/// A key of a summary that depends on the machine and its load, not on the case, beside those of its times.
+const COST: &str = "cpu_per_step_s";
 
 /// All numbers of a summary by their key, those of inner tables with a dot between.
 pub fn figures(summary: &Summary) -> BTreeMap<String, f64> {
@@ -104,8 +103,10 @@ pub fn keys(summary: &Summary) -> Vec<String> {
 /// What does not depend on the machine, without inner tables.
 fn flat(summary: &Summary) -> Vec<(String, Value)> {
     let mut all = Vec::new();
-    if let Ok(Value::Object(table)) = serde_json::to_value(summary) {
-        let own = table.into_iter().filter(|(key, _)| !MACHINE.contains(&key.as_str()));
+    if let (Ok(Value::Object(table)), Ok(times)) =
+        (serde_json::to_value(summary), serde_json::to_value(summary.times))
+    {
+        let own = table.into_iter().filter(|(key, _)| key != COST && times.get(key).is_none());
         own.for_each(|(key, value)| flatten(key, value, &mut all));
     }
     all

@@ -148,14 +148,16 @@ fn responses(all: &Collected) -> Option<Figure> {
         .filter(|k| all.rows.iter().any(|row| row.values[*k] != all.rows[0].values[*k]))
         .collect();
     // the other key whose values are curves of their own: one of few words
-    let split = (0..all.keys.len()).find(|k| !is_number(all, *k) && words(all, *k).len() <= MOST_CURVES);
+    let split = (0..all.keys.len())
+        .filter(|k| !is_number(all, *k))
+        .map(|k| (k, words(all, k)))
+        .find(|(_, words)| words.len() <= MOST_CURVES);
     let panel = |choice: usize, name: &String| {
         let k = keys[choice];
-        let curves = match split {
-            Some(other) => {
-                let words = words(all, other);
+        let curves = match &split {
+            Some((other, words)) => {
                 let of_word = |(colour, word): (usize, &String)| {
-                    response(all, k, name, (word, colour), &|row| row.values[other] == *word)
+                    response(all, k, name, (word, colour), &|row| row.values[*other] == *word)
                 };
                 words.iter().enumerate().flat_map(of_word).collect()
             }

@@ -1,6 +1,7 @@
 //! Which runs a comparison takes: every combination, each checked before the first one starts.
 
 use crate::arguments::{CompareArguments, RunArguments};
+use crate::show::in_one_line;
 use crate::{logger, soil_module, testbed};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,8 +47,7 @@ impl Plan {
 
     /// Steps of all its runs.
     pub fn steps(&self) -> u64 {
-        let time = self.scenario.time;
-        let once = (time.duration_s / time.step_s).round() as u64;
+        let once = self.scenario.time.steps();
         if self.refused.is_some() {
             return 0;
         }
@@ -299,13 +299,7 @@ fn is_wrong(plan: &Plan, all: &[Plan]) -> bool {
 
 /// What the table says of a row that cannot run.
 pub fn reason(error: &Error) -> String {
-    match error {
-        Error::Input(input) => match &input.help {
-            Some(help) => format!("{REFUSED}{input}; {help}"),
-            None => format!("{REFUSED}{input}"),
-        },
-        other => format!("{REFUSED}{other}"),
-    }
+    format!("{REFUSED}{}", in_one_line(error))
 }
 
 fn refused_reference(plan: &Plan, error: Error) -> Error {

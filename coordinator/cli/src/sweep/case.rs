@@ -2,15 +2,13 @@
 
 use crate::interrupt::Interrupt;
 use crate::progress::{self, Progress, Waiting};
-use crate::scenario_arguments::ScenarioArguments;
+use crate::show::{self, in_one_line};
 use crate::sweep_arguments::SweepRunArguments;
-use crate::{Exit, apart, exit_of, run, show, soil_module, testbed};
+use crate::{Exit, apart, exit_of, run, testbed};
 use std::path::Path;
 use terraglue_diagnostics::{Error, Result};
-use terraglue_engine::testbed::Testbed;
 use terraglue_recording::Status;
-use terraglue_scenario::Scenario;
-use terraglue_sweep::{Case, CaseStatus, Claim, Outcome, Sweep, figures};
+use terraglue_sweep::{CaseStatus, Claim, Outcome, Sweep, figures};
 
 /// Runs the case that the arguments name; nothing where it is done.
 pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
@@ -32,25 +30,18 @@ pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
         return Ok(Exit::Done);
     }
     emptied(&place)?;
-    let (scenario, testbed) = match made(&sweep, case, &interrupt) {
+    let modules = &sweep.settings.module_paths;
+    let options = testbed::options_of(1, modules, &interrupt.flag());
+    let (testbed, scenario) = match super::built(&sweep.scenario(), &sweep.sets(case), &options) {
         Ok(made) => made,
         Err(error) => {
-            let reason = match &error {
-                Error::Input(input) => [Some(input.message.clone()), input.help.clone()]
-                    .into_iter()
-                    .flatten()
-                    .collect::<Vec<_>>()
-                    .join("; "),
-                other => other.to_string(),
-            };
-            Outcome::without_figures(CaseStatus::Refused, reason).write(&place)?;
+            Outcome::without_figures(CaseStatus::Refused, in_one_line(&error)).write(&place)?;
             return Err(error);
         }
     };
     interrupt.run();
-    let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
-    let bar = progress::bar(steps, arguments.quiet);
-    let waiting = Waiting::standing(arguments.quiet, &bar, std::sync::Arc::default(), "");
+    let bar = progress::bar(scenario.time.steps(), arguments.quiet);
+    let waiting = Waiting::standing(arguments.quiet, &bar, options.standing, "");
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "").after(waiting);
     let asked = &sweep.settings.collect;
     let records =
@@ -83,15 +74,6 @@ fn finished(outcome: &run::Outcome, place: &Path, quiet: bool) -> Result<Exit> {
             Ok(Exit::Done)
         }
     }
-}
-
-fn made(sweep: &Sweep, case: &Case, interrupt: &Interrupt) -> Result<(Scenario, Testbed)> {
-    let (path, sets, modules) = (sweep.scenario(), sweep.sets(case), &sweep.settings.module_paths);
-    let scenario = Scenario::load(&path, &sets)?;
-    let arguments = ScenarioArguments { scenario: path, sets, module_path: modules.clone() };
-    soil_module::check(&scenario, &arguments)?;
-    let testbed = testbed::build(&scenario, &testbed::options_of(1, modules, &interrupt.flag()))?;
-    Ok((scenario, testbed))
 }
 
 /// An empty folder, whatever a process that was killed has left in it.

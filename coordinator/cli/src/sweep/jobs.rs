@@ -1,8 +1,8 @@
 //! The missing cases of a sweep, several at a time, each in a process of its own: one that crashes costs its own case only.
 
-use crate::Exit;
 use crate::interrupt::Interrupt;
 use crate::sweep_arguments::SweepRunArguments;
+use crate::{Exit, apart};
 use indicatif::{ProgressBar, ProgressStyle};
 use rustix::process::Signal;
 use std::io::{IsTerminal, Read};
@@ -100,8 +100,7 @@ fn forget_failed(sweep: &Sweep) -> Result {
 /// Runs a case in a process. A crash is its outcome; where it was killed it stays missing.
 fn one(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result {
     let failed = |source| Error::File { path: format!("the process of case {}", case.number), source };
-    let own = std::env::current_exe().ok().filter(|program| program.is_file());
-    let mut child = Command::new(own.unwrap_or_else(|| "/proc/self/exe".into()))
+    let mut child = Command::new(apart::own_program())
         .args(["sweep", "run"])
         .arg(sweep.folder())
         .args(["--case", &case.number.to_string(), "--quiet", "--with-parent"])

@@ -72,7 +72,7 @@ impl Told {
             error: column("locator.error")?,
             own_stems: column("locator.own_stems")?,
             hidden: column("locator.hidden")?,
-            real_time_factor: summary["times"]["real_time_factor"].as_f64().unwrap_or(f64::NAN),
+            real_time_factor: summary["real_time_factor"].as_f64().unwrap_or(f64::NAN),
             folder,
         })
     }

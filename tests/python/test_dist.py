@@ -48,6 +48,13 @@ def test_a_scenario_runs_in_an_empty_environment_from_another_folder(unpacked, t
     assert str(ROOT) not in done.stderr
 
 
+def test_all_scenarios_find_their_modules(unpacked, tmp_path):
+    scenarios = sorted((unpacked / "share/terraglue/scenarios").glob("*.toml"))
+    assert len(scenarios) > 10
+    refused = {path.name: done.stderr for path in scenarios if (done := bare(unpacked / "bin/terraglue", "check", path, cwd=tmp_path)).returncode}
+    assert not refused
+
+
 @pytest.fixture
 def bare_root(unpacked, tmp_path):
     """A root folder that holds the archive as /opt and the C library, with /proc, /dev/null and an empty /tmp: what the emptiest container offers."""

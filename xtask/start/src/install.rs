@@ -79,15 +79,16 @@ fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))
 }
 
-/// Packages of the plugins that the program brings: all folders `plugin` below modules/.
+/// Packages of the plugins that the program brings: all below modules/ that make a dynamic library.
 fn plugins(folder: &Path) -> Outcome<Vec<String>> {
     let entries = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let mut found = Vec::new();
     for path in entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()) {
-        match path.join("Cargo.toml") {
-            manifest if path.ends_with("plugin") && manifest.is_file() => found.push(package(&manifest)?),
-            _ => found.extend(plugins(&path)?),
+        let manifest = path.join("Cargo.toml");
+        if manifest.is_file() && read(&manifest)?.contains("crate-type = [\"cdylib\"]") {
+            found.push(package(&manifest)?);
         }
+        found.extend(plugins(&path)?);
     }
     Ok(found)
 }

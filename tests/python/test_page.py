@@ -130,8 +130,11 @@ WATCH = """async ([base64, t, other]) => {
   const [w, h] = [video.videoWidth, video.videoHeight];
   const paper = Object.assign(document.createElement("canvas"), { width: w, height: h }).getContext("2d");
   const at = async (time) => {
+    // the picture comes after the place is reached
+    const shown = new Promise((done) => video.requestVideoFrameCallback(done));
+    const reached = new Promise((done) => { video.onseeked = done; });
     video.currentTime = time;
-    await new Promise((done) => { video.onseeked = done; });
+    await Promise.all([reached, shown]);
     paper.drawImage(video, 0, 0);
     return paper.getImageData(0, 0, w, h).data;
   };
@@ -307,6 +310,18 @@ def test_a_lost_connection_is_told_at_once(tmp_path):
         page.locator("#banner").wait_for(state="visible", timeout=8000)
         assert "Connection lost" in page.locator("#banner").inner_text()
         assert "not connected" in page.locator(".topbar .pill").inner_text()
+
+
+def test_a_page_that_was_busy_itself_has_not_lost_the_connection(tmp_path):
+    with served(MOON_WALK, "--out", tmp_path / "out", "--pace", 0.1) as address, opened(viewport={"width": 1200, "height": 800}) as page:
+        page.goto(address)
+        ready(page)
+        page.evaluate("new MutationObserver(() => { document.body.dataset.lost = 'yes'; }).observe(document.getElementById('banner'), { childList: true })")
+        for _ in range(2):
+            page.evaluate("{ const from = performance.now(); while (performance.now() - from < 6500); }")
+            page.wait_for_timeout(1500)
+        assert page.evaluate("document.body.dataset.lost") is None
+        assert page.errors == []
 
 
 def test_a_recording_is_replayed_by_the_same_page(walk):

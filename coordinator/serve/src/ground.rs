@@ -178,6 +178,11 @@ impl Ground {
         (!stale.is_empty()).then(|| self.mesh(stale.into_iter()))
     }
 
+    /// Triangles that have been sent are those of now.
+    pub fn forget_changes(&mut self) {
+        self.stale.clear();
+    }
+
     /// Triangles of all of it.
     pub fn whole_mesh(&self) -> Stored {
         let edge = self.mesh_edge();

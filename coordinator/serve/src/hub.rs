@@ -268,9 +268,16 @@ impl Hub {
         }
     }
 
-    /// All of the ground as triangles.
+    /// All of the ground as triangles, for one that begins to draw it. What has changed while nobody drew counts no more.
     pub fn whole_mesh(&self) -> Option<Stored> {
-        locked(&self.ground).as_ref().map(Ground::whole_mesh)
+        self.send_ground();
+        let alone = locked(&self.mesh_clients).len() <= 1;
+        let mut held = locked(&self.ground);
+        let ground = held.as_mut()?;
+        if alone {
+            ground.forget_changes();
+        }
+        Some(ground.whole_mesh())
     }
 
     /// All of the ground as it is now.

@@ -24,6 +24,7 @@ mod glued;
 mod group;
 mod hosted;
 mod loops;
+mod newton;
 mod pieces;
 mod reload;
 mod run_clock;

@@ -128,23 +128,25 @@ impl Link {
         Ok(values)
     }
 
-    /// Derivatives of its values by entry `k` of the inputs that `other` feeds, where the subsystem between knows them.
+    /// Derivatives of its values by entry `k` of the inputs that `other` feeds; false where the subsystem between does not know them.
     ///
     /// # Errors
     /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem fails.
-    pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
-        let mut out = vec![0.0; self.count()];
-        if self.from == other.to {
-            if !instances[self.from].derivatives(
-                self.output_ids(),
-                By::Variable(other.input_ids()[k]),
-                &mut out,
-            )? {
-                return Ok(None);
-            }
-            out.iter_mut().enumerate().for_each(|(k, x)| *x *= self.conversion(k).0);
+    pub fn derivatives(
+        &self,
+        instances: &[Instance],
+        other: &Self,
+        k: usize,
+        out: &mut [f64],
+    ) -> Result<bool> {
+        out.fill(0.0);
+        if self.from != other.to {
+            return Ok(true);
         }
-        Ok(Some(out))
+        let by = By::Variable(other.input_ids()[k]);
+        let known = instances[self.from].derivatives(self.output_ids(), by, out)?;
+        out.iter_mut().enumerate().for_each(|(k, x)| *x *= self.conversion(k).0);
+        Ok(known)
     }
 
     /// Sets the inputs.

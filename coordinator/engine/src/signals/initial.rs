@@ -105,10 +105,14 @@ fn differences(
 
 /// dy/du of entry `e` of link `l`, where it is known without trying.
 fn known(links: &[Link], instances: &[Instance], l: usize, e: usize) -> Result<Option<Vec<f64>>> {
-    let mut column = Vec::new();
+    let mut column = vec![0.0; links.iter().map(Link::count).sum()];
+    let mut rest = &mut column[..];
     for link in links {
-        let Some(part) = link.derivatives(instances, &links[l], e)? else { return Ok(None) };
-        column.extend(part);
+        let (own, after) = rest.split_at_mut(link.count());
+        if !link.derivatives(instances, &links[l], e, own)? {
+            return Ok(None);
+        }
+        rest = after;
     }
     Ok(Some(column))
 }

@@ -3,9 +3,10 @@
 //!
 //! An FMU whose outputs follow its inputs at once takes the value at the end of the step; any other one takes the mean of the values
 //! at start and end, which makes the step of second order. Each repetition begins with the state at the start of the step.
-//! The next values are those that Anderson's combination (1965) makes of the last six: it needs no derivatives, and solves loops whose
-//! gains are above one, too.
+//! The next values are those that Anderson's combination (1965) makes of the last six, of Newton's steps where all FMUs of the loop have
+//! directional derivatives, else of the residuals: loops whose gains are above one are solved, too.
 
+use super::newton::Newton;
 use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
@@ -45,6 +46,7 @@ pub(super) struct Loops {
     /// Values at the start of the step, and those that the trial was made with.
     start: Vec<f64>,
     guess: Vec<f64>,
+    newton: Newton,
     acceleration: Acceleration,
 }
 
@@ -56,6 +58,7 @@ impl Default for Loops {
             state: 0,
             start: Vec::new(),
             guess: Vec::new(),
+            newton: Newton::default(),
             acceleration: Acceleration::new(Relaxation::Anderson, 1.0),
         }
     }
@@ -101,6 +104,7 @@ impl Loops {
             let names = links.numbers[faulty.link].names(instances);
             return Err(format!("a fault changes {}: it cannot be iterated", names.join(", ")));
         }
+        loops.newton = Newton::new(iterated.iter().map(|i| i.link), links, &loops.members);
         loops.links = iterated;
         Ok(loops)
     }
@@ -163,8 +167,11 @@ impl Loops {
                 residual.push(value - guess);
             }
         }
-        let step = self.acceleration.step(&self.guess);
-        self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
+        if !stands {
+            self.newton.solve(residual, links, instances)?;
+            let step = self.acceleration.step(&self.guess);
+            self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
+        }
         Ok(stands)
     }
 

@@ -56,6 +56,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
         ),
     ];
     all.push(chain(folder)?);
+    all.extend(newton(folder)?);
     all.extend(van_der_pol(folder)?);
     Ok(all)
 }
@@ -118,6 +119,77 @@ fn chain(folder: &Path) -> Outcome<Figure> {
     }
     let what = "ten FMUs with direct feed-through behind each other: how late the last one is, s";
     Ok(Figure::new("fmi.order.chain", worst, Limit::AtMost(1e-12), what))
+}
+
+/// Loops of three FMUs that feed each other at once: how often one of them makes a step, with and without directional derivatives.
+fn newton(folder: &Path) -> Outcome<Vec<Figure>> {
+    // gains of 3, −4 and 0.5; and x = cos(z + t), y = 0.5 + 0.2 x², z = exp(−y)
+    let linear = [("v[2] + 3 * v[0]", "3"), ("2 - 4 * v[0]", "-4"), ("0.5 * v[0]", "0.5")];
+    let curved = [
+        ("cos(v[0] + v[2])", "-sin(v[0] + v[2])"),
+        ("0.5 + 0.2 * v[0] * v[0]", "0.4 * v[0]"),
+        ("exp(-v[0])", "-exp(-v[0])"),
+    ];
+    let mut all = Vec::new();
+    for (id, equations, least) in [("linear", linear, 2.0), ("curved", curved, 5.0)] {
+        let (with, residual) = steps_of_a_loop(folder, &format!("{id}_newton"), &equations, true)?;
+        let (without, _) = steps_of_a_loop(folder, &format!("{id}_plain"), &equations, false)?;
+        let id = |end: &str| format!("fmi.order.newton.{id}{end}");
+        let what = |what: &str| format!("loop of three FMUs, {what}");
+        all.push(Figure::new(
+            id(""),
+            with,
+            Limit::AtMost(least),
+            what("trials of a step by Newton with directional derivatives"),
+        ));
+        all.push(Figure::new(
+            id(".without"),
+            without,
+            Limit::None,
+            what("trials of a step without derivatives"),
+        ));
+        all.push(Figure::new(
+            id(".residual"),
+            residual,
+            Limit::AtMost(1e-9),
+            what("what is left of the equations"),
+        ));
+    }
+    Ok(all)
+}
+
+/// Trials of each step of a ring of three FMUs, and the residual of its equations at the end.
+fn steps_of_a_loop(
+    folder: &Path,
+    kind: &str,
+    equations: &[(&str, &str); 3],
+    derivatives: bool,
+) -> Outcome<(f64, f64)> {
+    const STEPS: f64 = 5.0;
+    // the count is no part of a state that is restored
+    let step = "static double trials; v[1] = ++trials; v[2] += h;";
+    let all = [("u", 'i', 0.1), ("trials", 'o', 0.0), ("t", 's', 0.0), ("asked", 'o', 0.0), ("y", 'o', 0.0)];
+    let mut text = format!("[time]\nstep_s = 0.1\nduration_s = {}\n", 0.1 * STEPS);
+    for (name, (right, slope)) in ["a", "b", "c"].iter().zip(equations) {
+        let calc = format!("v[4] = {right};");
+        let fmu = format!("{kind}_{name}");
+        if derivatives {
+            fmus::build_with_slope(folder, &fmu, &all, (&calc, step), slope)?;
+        } else {
+            fmus::build(folder, &fmu, &all, &calc, step)?;
+        }
+        text += &format!("[{name}]\nfmu = \"{fmu}.fmu\"\n");
+    }
+    for (from, to) in [("a", "b"), ("b", "c"), ("c", "a")] {
+        text += &format!("[[connect]]\nfrom = \"{from}.y\"\nto = \"{to}.u\"\n{ITERATE}");
+    }
+    let mut testbed = built(folder, &text)?;
+    testbed.run_until(0.1 * STEPS, &mut []).map_err(|e| e.to_string())?;
+    let read = |name: &str| testbed.read(name).unwrap_or(f64::NAN);
+    let [a, b, c] = ["a.y", "b.y", "c.y"].map(read);
+    let taken = ["b.u", "c.u", "a.u"].map(read);
+    let residual = [a, b, c].iter().zip(taken).map(|(y, u)| (y - u).abs()).fold(0.0, larger);
+    Ok((read("a.trials") / STEPS, residual))
 }
 
 /// Damping parameter of both oscillators, and the stiffness between them.

@@ -24,7 +24,7 @@ export class Link extends EventTarget {
     Object.assign(this, { address, channels: new Map(), byTopic: new Map(), wanted: new Map(), services: new Map() });
     Object.assign(this, { calls: new Map(), writes: new Map(), numbers: 0, attempts: 0, watched: [], open: false, info: null });
     this.connect();
-    // a server that says nothing any more is as good as gone: its state comes five times a second
+    // a server that is silent is as good as gone: it sends its state five times a second
     setInterval(() => { if (this.open && performance.now() - this.heard > SILENCE_MS) this.socket.close(); }, 1000);
   }
 

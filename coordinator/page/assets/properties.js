@@ -68,7 +68,7 @@ export class Properties {
     for (const action of this.run.actions.filter((a) => below(a.id))) this.action(action, group);
     this.weaken(`${group}.max_torque`);
     if (!own.length) htmlElement(this.list, "p", "hint", "It has parts, and no variables of its own.");
-    // what can be changed stands first
+    // variables that can be changed come first
     const order = ["live", "needs reset", "read only"];
     own.sort((a, b) => order.indexOf(this.run.variables.get(a).effect) - order.indexOf(this.run.variables.get(b).effect));
     for (const id of own) this.rows.set(id, new Row(this.list, this.run, this.run.variables.get(id), group));

@@ -96,7 +96,7 @@ class Replay {
     });
   }
 
-  // What the address asks for.
+  // Applies the settings in the address.
   obey() {
     const wish = wishes();
     const [camera, ground] = ["camera", "ground"].map((key) => wish.get(key) ?? this.page?.[key]);

@@ -214,7 +214,7 @@ export class Scope {
     return plot;
   }
 
-  // Without the quantity that stands beside the axis, where all share it.
+  // Without the quantity, where all share it: it is written next to the axis.
   shortName(id, entry) {
     const same = entry.ids.every((other) => other.endsWith(`.${entry.quantity}`));
     return same ? id.slice(0, -entry.quantity.length - 1) : id;

@@ -7,7 +7,7 @@ use terraglue_host::Instance;
 use terraglue_recording::TopicInfo;
 use terraglue_subsystem::{Causality, Effect, ValueType, Variable};
 
-/// What kind of value it is, for people and forms.
+/// Name of the kind of a value, for people and forms.
 fn kind(of: ValueType) -> &'static str {
     match of {
         ValueType::F64 | ValueType::F32 => "real",

@@ -21,7 +21,7 @@ const NEVER: Duration = Duration::from_secs(86_400);
 /// Whether the connection goes on.
 type Goes = Result<(), axum::Error>;
 
-/// Whether each message of a topic stands for itself: what comes later takes its place.
+/// Whether each message of a topic is complete in itself: a later one replaces it.
 fn only_newest_counts(topic: &str, schema: &str) -> bool {
     let own = topic == "/tf" || topic.starts_with("/joints/") || topic.starts_with("/contact_forces");
     own || ["foxglove.PointCloud", "foxglove.LaserScan"].contains(&schema)
@@ -44,7 +44,7 @@ pub struct Connection {
     subscriptions: HashMap<u16, u32>,
     /// Channels of which only the newest message counts, with that message until the next beat.
     held: BTreeMap<u16, Option<Arc<Stored>>>,
-    /// What was sent last of the channels on which something stands.
+    /// Message sent last on each channel whose last message stays valid.
     sent: HashMap<u16, Arc<Stored>>,
     followed: BTreeSet<String>,
     services: Vec<String>,
@@ -177,7 +177,7 @@ impl Connection {
         self.again(socket).await
     }
 
-    /// What stands, of everything that is subscribed to; not again what was sent as it is.
+    /// Sends the last message of every subscribed channel, unless it was sent already.
     async fn again(&mut self, socket: &mut WebSocket) -> Goes {
         let mut channels: Vec<u16> = self.subscriptions.keys().copied().collect();
         channels.sort_unstable();

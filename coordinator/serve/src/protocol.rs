@@ -10,7 +10,7 @@ use terraglue_recording::{Stored, TopicInfo};
 /// Names under which clients ask for it.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
-/// What every client is told first.
+/// Content of the first message to every client.
 #[derive(Clone, Default)]
 pub struct Welcome {
     /// Name of the run.
@@ -76,7 +76,7 @@ pub struct Subscription {
 pub struct Parameter {
     /// Full name.
     pub name: String,
-    /// What it is to be.
+    /// The value to set.
     #[serde(default)]
     pub value: Value,
 }

@@ -1,4 +1,4 @@
-//! What can be seen: rays, heights and overlaps among the shapes and grounds of all subsystems.
+//! Geometric queries on the world: rays, heights and overlaps among the shapes and grounds of all subsystems.
 //!
 //! [`WorldModel`] is what the host offers to a subsystem that sees ([`terraglue_subsystem::World`]). [`WorldBuilder`] takes scenes and
 //! states; after that every step is one [`WorldModel::update`], which costs nothing for bodies that are fixed.

@@ -274,7 +274,7 @@ impl Testbed {
         Ok(outcome)
     }
 
-    /// Steps until `until_s`, an error, or the cancel flag; tells the observers. The observers' `finished` is
+    /// Steps until `until_s`, an error, or the cancel flag; notifies the observers. The observers' `finished` is
     /// left to the caller, who knows whether the run goes on.
     ///
     /// # Errors
@@ -301,7 +301,7 @@ impl Testbed {
     }
 
     /// Cost of the steps of each subsystem so far, s of wall time. Without glue: the steps that were watched, times the
-    /// steps that each stands for; with glue: all calls in a step.
+    /// steps that each represents; with glue: all calls in a step.
     pub fn costs(&self) -> impl Iterator<Item = (&str, f64)> {
         let cost = |slot| self.subsystems.cost(slot).as_secs_f64();
         self.instances().iter().enumerate().map(move |(slot, i)| (i.name(), cost(slot)))

@@ -69,7 +69,7 @@ fn check_page(scenario: &Scenario, directory: &Directory) -> Result {
     Ok(())
 }
 
-/// The names that report and page speak of must exist.
+/// The names that report and page refer to must exist.
 ///
 /// # Errors
 /// One does not.
@@ -105,7 +105,7 @@ pub fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Ins
     Ok(())
 }
 
-/// What is wrong with a joint whose points are so far apart, and the way out.
+/// Message about a joint whose points are `gap_m` apart, m, and the way out.
 pub(super) fn gap_words([a, b]: &[String; 2], gap_m: f64) -> (String, String) {
     let gap = if gap_m < 1e-3 { format!("{gap_m:.2e}") } else { format!("{gap_m:.4}") };
     let message = format!(

@@ -111,7 +111,7 @@ fn misfit(old: &Instance, new: &Instance) -> Option<String> {
     None
 }
 
-/// A soil whose tiles bear other generations than those of the soil before it, which counted from its own start: what
+/// A soil whose tiles have other generations than those of the soil before it, which counted from its own start: what
 /// others keep of a tile is then looked at again.
 struct Renumbered {
     inner: Box<dyn Subsystem>,

@@ -47,8 +47,8 @@ pub struct StepReport {
     /// Largest |T* − T1| along n, N.
     pub estimate_gap_n: f64,
     /// |Work on side 1 + work on side 2| in the step, J, each by the wrench that acted there: on a body the wrench that it
-    /// was told, on a soil that of its own law at the motion committed. What springs of the glue stored and what dampers and
-    /// friction between bodies turned into heat is taken off. Not a number where a soil keeps no energy ledger.
+    /// received, on a soil that of its own law at the motion committed. Energy stored by springs of the glue, and heat of its
+    /// dampers and of friction between bodies, is subtracted. NaN where a soil keeps no energy ledger.
     pub interface_work_error_j: f64,
     /// Σ |T·x1| over the ports in the step, J: how much work went through them.
     pub port_work_path_j: f64,

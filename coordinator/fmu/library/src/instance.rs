@@ -55,7 +55,7 @@ impl Log {
     }
 }
 
-/// What a handle of the master points at.
+/// The instance behind a handle of the master.
 pub struct Instance {
     pub fmu: ExportedInstance,
     pub log: Log,

@@ -73,7 +73,7 @@ named! {
 }
 
 named! {
-    /// What the iteration of a step begins with: `gluing.start`.
+    /// Initial guess of the iteration of a step: `gluing.start`.
     StartChoice {
         /// min(T*, F), from the estimate of the bodies and the law of the soil.
         Estimate = "estimate",

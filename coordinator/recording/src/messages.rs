@@ -1,4 +1,4 @@
-//! What `/gluing` says of a step, as the report and programs read it; [`super::gluing_message`] is its form in the file.
+//! Content of `/gluing` for a step, as the report and programs read it; [`super::gluing_message`] is its form in the file.
 
 use terraglue_gluing::StepReport;
 

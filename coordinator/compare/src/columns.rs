@@ -41,7 +41,7 @@ impl FigureColumn {
 }
 
 impl FigureColumn {
-    /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
+    /// Text of the cell of a row: the figure, that it is unknown or does not apply, or a dash.
     pub fn text(&self, row: &CompareRow) -> String {
         let value = (self.value)(row);
         let value = if WAYS.contains(&self.key) { value.map(without_rounding) } else { value };

@@ -15,7 +15,7 @@ use terraglue_scaffold::{Kind, Language};
 #[derive(Parser, Debug)]
 #[command(name = "terraglue", version = terraglue_checkpoint::VERSION, after_help = EXAMPLES, disable_help_subcommand = true)]
 pub struct Arguments {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -161,7 +161,7 @@ pub struct RunArguments {
     pub json: bool,
 }
 
-/// What stands for the scenario of a run that is resumed; the checkpoint knows it.
+/// Placeholder for the scenario of a run that is resumed; the checkpoint contains it.
 const AS_KEPT: &str = "as kept with the checkpoint";
 
 /// What `run` takes.
@@ -212,7 +212,7 @@ Examples:
   terraglue run scenarios/moon_walk.toml --duration 60 --checkpoint-every 5s --out runs/long
   terraglue run --resume runs/long      after a crash, a kill or Ctrl-C: the files end as if nothing had happened";
 
-/// Multiples of shorter times are no longer told apart from each other in a long run, s.
+/// Multiples of shorter times cannot be distinguished in a long run, s.
 const SHORTEST_S: f64 = 1e-6;
 
 /// A time in seconds, or with a unit.
@@ -321,7 +321,7 @@ pub struct CheckModuleArguments {
     /// List the tests.
     #[arg(long)]
     pub list: bool,
-    /// Build the sources of a module in C or C++ with the compiler's sanitizers instead, and tell what they find in the tests.
+    /// Build the sources of a module in C or C++ with the compiler's sanitizers instead, and report findings of the tests.
     #[arg(long)]
     pub sanitize: bool,
     /// A source for --sanitize [default: those beside the module]. May be repeated.
@@ -362,7 +362,7 @@ pub struct RobotArguments {
 #[derive(Args, Debug, Clone)]
 #[command(after_help = NEW_EXAMPLES)]
 pub struct NewArguments {
-    /// What to make.
+    /// Kind of the module to make, or `scenario`.
     #[arg(value_parser = one_of(New::ALL, New::word))]
     pub kind: New,
     /// Name of the module and of its folder, e.g. my-soil; of a scenario: its folder [default: as the robot file].
@@ -371,7 +371,7 @@ pub struct NewArguments {
     /// Language [default: rust; a law: scenario].
     #[arg(long, value_parser = one_of(Language::ALL, Language::word))]
     pub lang: Option<Language>,
-    /// Of a scenario: the robot that stands there (URDF, xacro or MJCF).
+    /// Of a scenario: the robot in it (URDF, xacro or MJCF).
     #[arg(long, value_name = "FILE")]
     pub robot: Option<PathBuf>,
     /// Of a scenario: the folder for it.
@@ -496,7 +496,7 @@ pub struct CompareArguments {
     /// Communication steps in seconds, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "SECONDS", allow_negative_numbers = true)]
     pub steps: Vec<f64>,
-    /// Print all figures, not only those that tell most.
+    /// Print all figures, not only the main ones.
     #[arg(long, visible_alias = "all")]
     pub details: bool,
     /// Compare the path of the reported body with this: a strategy, e.g. `monolithic`, run on each soil (of several
@@ -577,7 +577,7 @@ fn parse_vary(text: &str) -> Result<(String, Vec<String>), String> {
     }
 }
 
-/// What can be done with a functional mock-up unit.
+/// Commands for a functional mock-up unit.
 #[derive(Subcommand, Debug)]
 pub enum FmuCommand {
     /// Run an FMU alone and write its outputs as a table.

@@ -1,4 +1,4 @@
-//! What is printed: errors with their place, tables.
+//! Output of the commands: errors with their place, tables.
 
 use super::shorten;
 use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
@@ -153,7 +153,7 @@ pub fn listing(headers: &[&str]) -> Table {
     }
 }
 
-/// What each subsystem cost.
+/// Table with the wall time of each subsystem.
 pub fn costs(costs: &[(String, f64)], steps: u64) -> Table {
     let mut t = table(&["subsystem", "wall time", "per step"]);
     for (name, s) in costs {

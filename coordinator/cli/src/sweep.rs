@@ -156,7 +156,7 @@ fn at_key(plan: &SweepPlan, (key, value): (&String, &String), error: Error) -> E
     }
 }
 
-/// What is collected must be a variable that is a number, or a key of the summary.
+/// Checks that each collected name is a variable that is a number, or a key of the summary.
 fn known(testbed: &Testbed, scenario: &Scenario, names: &[String]) -> Result {
     if names.is_empty() {
         return Ok(());

@@ -49,7 +49,7 @@ pub const TESTS: &[Test] = {
     ]
 };
 
-/// What is not known of a module in Python.
+/// Reason to skip for a module in Python.
 const MEMORY: &str = "its memory is not watched";
 
 /// The same way again and again: nothing new appears after the first two rounds.

@@ -1,4 +1,4 @@
-//! What gluing relies on: force and motion answer each other, the estimate is respected, the ledgers are true.
+//! Properties on which gluing relies: force and motion answer each other, the estimate is respected, the ledgers are true.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};

@@ -223,7 +223,7 @@ impl Testbed {
         Ok(())
     }
 
-    /// (1) What the time line has for this communication point.
+    /// (1) Events of the time line at this communication point.
     fn apply_events(&mut self) -> Result {
         let (t, h) = (self.clock.t, self.clock.step_s);
         while let Some(due) = self.signals.time_line.next_due(t, h, &self.subsystems.instances) {

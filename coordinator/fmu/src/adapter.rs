@@ -120,7 +120,7 @@ impl FmuSubsystem {
         Ok(subsystem)
     }
 
-    /// What [`terraglue_host::Library::with_fmus`] takes.
+    /// Argument of [`terraglue_host::Library::with_fmus`].
     ///
     /// # Errors
     /// As [`FmuSubsystem::new`].

@@ -1,7 +1,7 @@
 //! Named numbers as a Protobuf message: `LF_j2.angle` is the field `angle` of the field `LF_j2`.
 //!
 //! The message type is made of the names when a run starts, so every reader of Protobuf plots the variables without
-//! knowing this program. What Protobuf cannot say, the exact name, the unit and the help of each column, is JSON in
+//! knowing this program. Exact name, unit and help of each column, for which Protobuf has no place, are JSON in
 //! the channel's metadata under `columns`.
 
 use crate::descriptor;

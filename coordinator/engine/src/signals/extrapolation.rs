@@ -9,7 +9,7 @@
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::{Recall, Remember};
 
-/// Held value of an input that goes from `start` to `end` in a step: the end where outputs follow inputs at once, else the mean.
+/// Held value of an input that goes from `start` to `end` in a step: the end if outputs follow inputs at once, else the mean.
 pub fn held(takes_end: bool, start: f64, end: f64) -> f64 {
     if takes_end { end } else { 0.5 * (start + end) }
 }

@@ -63,7 +63,7 @@ const REACHED: &str = "reached";
 /// Report of a process to the one that waits for it. It owns no descriptor: an FMU may close those of others.
 pub struct Report {
     reached: PathBuf,
-    /// Rows so far: a change says that it goes on.
+    /// Rows so far: a change means that it goes on.
     count: u64,
 }
 
@@ -99,7 +99,7 @@ fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
     std::thread::spawn(move || {
         let mut left = MOST_OUTPUT;
         let mut bytes = [0; 8192];
-        // a process that is gone has no more to say
+        // a process that is gone writes no more
         while let Ok(count @ 1..) = from.read(&mut bytes) {
             let shown = count.min(left);
             drop(std::io::stderr().write_all(&bytes[..shown]));
@@ -111,7 +111,7 @@ fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
     })
 }
 
-/// Sends rows on to standard output; says when nobody reads them any more, as after `head`.
+/// Sends rows on to standard output; sets `unread` when nobody reads them any more, as after `head`.
 fn send_rows(mut from: PipeReader, unread: Arc<AtomicBool>) -> JoinHandle<()> {
     std::thread::spawn(move || {
         let mut out = std::io::stdout().lock();

@@ -29,7 +29,7 @@ pub fn fmu(command: &FmuCommand) -> Result<Exit> {
 
 fn input(message: impl ToString) -> Error {
     let message = message.to_string();
-    // what the system says has a cure of its own
+    // an error of the system has a cure of its own
     let help = (!message.contains("(os error "))
         .then(|| "docs/fmi.md tells what is read of FMUs, and how they are run".into());
     InputError::plain(message, help).into()

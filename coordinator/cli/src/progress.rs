@@ -32,7 +32,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// Waits for what `what` says.
+    /// Shows the text of `what` while it lasts.
     pub fn new(quiet: bool, bar: ProgressBar, what: impl Fn() -> String + Send + 'static) -> Self {
         let done = Arc::new(AtomicBool::new(quiet));
         let ended = Arc::clone(&done);

@@ -3,7 +3,7 @@
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `shot` takes.
+/// Arguments of `shot`.
 #[derive(Args, Debug, Clone)]
 pub struct ShotArguments {
     /// Folder of the run, e.g. runs/moon_walk.

@@ -251,7 +251,7 @@ fn drift(e: &Energies) -> String {
     format!("{drift_j:+.2e} J{share}{beyond}")
 }
 
-/// Electrical energy where a drive with losses says it, and the work of the motors.
+/// Electrical energy where a drive with losses reports it, and the work of the motors.
 fn both(electrical: Option<f64>, mechanical: Option<f64>, show: fn(f64) -> String) -> String {
     let part = |value: Option<f64>, what| Some(format!("{} {what}", show(value.filter(|e| *e > 0.0)?)));
     let all = [part(electrical, "electrical"), part(mechanical, "by the work of the motors")];

@@ -25,7 +25,7 @@ const MOST_TRIED: usize = 16;
 /// See [`MOST_TRIED`].
 const MOST_BUILT: usize = 8;
 
-/// Does what the arguments say.
+/// Runs the command of the arguments.
 pub fn sweep(arguments: &SweepArguments) -> Result<Exit> {
     match &arguments.command {
         None => list(arguments),

@@ -4,7 +4,7 @@ use crate::scenario_arguments::{parse_folder, parse_set};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// What `sweep` takes.
+/// Arguments of `sweep`.
 #[derive(Args, Debug, Clone)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, after_help = EXAMPLES)]
 pub struct SweepArguments {
@@ -54,7 +54,7 @@ pub enum SweepCommand {
     },
 }
 
-/// What `sweep run` takes.
+/// Arguments of `sweep run`.
 #[derive(Args, Debug, Clone)]
 pub struct SweepRunArguments {
     /// Folder of the sweep.

@@ -59,7 +59,7 @@ impl FigureColumn {
         }
     }
 
-    /// Whether any row has something to say.
+    /// Whether any row has a value.
     pub fn is_shown(&self, rows: &[CompareRow]) -> bool {
         rows.iter().any(|row| self.text(row) != cell(None, self.unit))
     }

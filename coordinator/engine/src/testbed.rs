@@ -392,7 +392,7 @@ impl Testbed {
         Ok(())
     }
 
-    /// Ends all subsystems. FMUs are told to terminate and are freed; what goes wrong there is an error too.
+    /// Ends all subsystems. FMUs are terminated and freed; a failure there is an error too.
     ///
     /// # Errors
     /// Error of a subsystem at its end.

@@ -1,4 +1,4 @@
-//! An FMU as a subsystem: trials by its saved states, values by name, every error with what the FMU said.
+//! An FMU as a subsystem: trials by its saved states, values by name, every error with the messages of the FMU.
 
 mod elements;
 mod opening;

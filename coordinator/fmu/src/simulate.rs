@@ -15,7 +15,7 @@ pub use super::table::{InputRow, Table};
 pub struct Settings {
     /// Start values by name, as text.
     pub start: Vec<(String, String)>,
-    /// s; none: what the FMU wants.
+    /// s; none: that of the FMU.
     pub start_time: Option<f64>,
     /// s.
     pub stop: Option<f64>,

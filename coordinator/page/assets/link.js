@@ -9,7 +9,7 @@ const AGAIN_MS = [300, 600, 1200, 2500];
 const textOf = new TextDecoder();
 const bytesOf = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
 
-/** What reads the messages of a channel: Protobuf by its descriptors, JSON, or bytes as they are. */
+/** The reader of the messages of a channel: Protobuf by its descriptors, JSON, or bytes as they are. */
 export function readerOf(channel) {
   if (channel.encoding === "json") return (bytes) => JSON.parse(textOf.decode(bytes));
   if (channel.encoding !== "protobuf") return (bytes) => bytes;

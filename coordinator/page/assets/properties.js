@@ -3,7 +3,7 @@ import { htmlElement, short } from "terraglue/axes.js";
 
 const EFFECTS = { live: "takes effect at the next step", "needs reset": "takes effect when the run starts again", "read only": "cannot be written" };
 
-// Text of an edit as the value that the variable's kind wants; undefined where it is none.
+// Text of an edit as a value of the variable's kind; undefined where it is none.
 function parsed(variable, text) {
   if (variable.kind === "string" || variable.kind === "enum") return text;
   const value = Number(text.trim().replace("−", "-").replace(",", "."));

@@ -96,7 +96,7 @@ export class Scope {
 
   names() { return [...new Set(this.plots.flatMap((p) => [...p.ids, ...(p.across ? [p.across] : [])]))]; }
 
-  /** As text for an address, and back: plots by `;`, variables by `,`, what stands along the axis after `@`. */
+  /** As text for an address, and back: plots by `;`, variables by `,`, the quantity along the axis after `@`. */
   get text() { return this.plots.map((p) => p.ids.join(",") + (p.across ? `@${p.across}` : "")).join(";"); }
   set text(text) {
     for (const plot of text.split(";").filter(Boolean)) {

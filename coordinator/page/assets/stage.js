@@ -147,7 +147,7 @@ export class Stage {
     this.view.torques = torques;
   }
 
-  // Points of a cloud in the world; those that hit the own body have another colour where the sensor says so.
+  // Points of a cloud in the world; those that hit the own body have another colour where the sensor marks them.
   takeCloud(topic, { frame_id: frame, pose, point_stride: stride, fields, data }) {
     const [view, place] = [new DataView(data.buffer, data.byteOffset, data.byteLength), this.placeOf(frame, pose)];
     if (!place || !stride) return;

@@ -1,5 +1,5 @@
 //! `/overlays/<owner>/<layer>`: what subsystems and the gluing show beside the bodies, a topic for each layer, so that viewers
-//! switch it on and off. Nobody is asked where the scenario does not want it.
+//! switch it on and off. No subsystem is asked where the scenario does not want it.
 
 use crate::layout::timestamp;
 use crate::scene_message::{along, pose, quaternion, vector};

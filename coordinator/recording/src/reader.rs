@@ -190,7 +190,7 @@ pub(crate) struct GroundChange {
 }
 
 impl GroundRecord {
-    /// Puts the nodes of a tile in; says what changed.
+    /// Puts the nodes of a tile in; returns the changes.
     fn patch(&mut self, cloud: &PointCloud, t_s: f64) -> GroundChange {
         let mut nodes = Vec::new();
         for ([x, y, z], sinkage) in point_cloud::unpack(cloud) {

@@ -190,7 +190,7 @@ impl GluingSums {
     }
 
     fn summary(&self) -> GluingSummary {
-        // what no step could say does not apply; before the first step nothing is known to be amiss
+        // a figure that no step could give does not apply; before the first step nothing is known to be amiss
         let applies = |steps: u64| self.steps == 0 || steps > 0;
         GluingSummary {
             form: self.form().into(),

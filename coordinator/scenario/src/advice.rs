@@ -25,7 +25,7 @@ pub fn late_events(scenario: &Scenario) -> Vec<String> {
     .collect()
 }
 
-/// Steps of a run beyond which it is said before it starts, and beyond which it is refused.
+/// Steps of a run beyond which a warning is given, and beyond which it is refused.
 const MANY_STEPS: f64 = 1e8;
 /// See [`MANY_STEPS`]: at a microsecond a step, which no subsystem needs less than, a quarter of an hour.
 pub(super) const MOST_STEPS: f64 = 1e9;

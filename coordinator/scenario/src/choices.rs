@@ -1,4 +1,4 @@
-//! Keys whose values are a fixed list of names, as enums: a `match` over one has no arm for a name that nobody knows.
+//! Keys whose values are a fixed list of names, as enums: a `match` over one has no arm for unknown names.
 
 /// An enum whose variants have a name each, in the order of the documentation.
 macro_rules! named {

@@ -68,7 +68,7 @@ pub struct SoilRow {
     pub values: [Option<f64>; COLUMNS.len()],
     /// Where the numbers come from.
     pub source: String,
-    /// How far they can be trusted; empty where the table does not say.
+    /// Confidence in them; empty where the table gives none.
     pub confidence: String,
     /// Why the row cannot be used as it stands.
     pub refused: Option<String>,

@@ -45,7 +45,7 @@ fn variable(id: &str, subsystem: &str, v: &Variable, start: &Value) -> Value {
         "choices": v.enumeration,
         "unit": v.unit,
         "help": v.help,
-        // JSON knows no infinity: no bound is null
+        // JSON has no infinity: no bound is null
         "min": v.min,
         "max": v.max,
         "effect": effect(v.effect),
@@ -101,7 +101,7 @@ fn shown(of: ValueType, names: &[String], number: f64) -> Value {
     }
 }
 
-/// `/variables` of a recording: what its channels say of themselves; all are read only.
+/// `/variables` of a recording, from the metadata of its channels; all are read only.
 pub fn recorded(topics: &[TopicInfo]) -> Value {
     let mut all = Vec::new();
     for topic in topics {

@@ -161,14 +161,14 @@ impl Connection {
         socket.send(Message::Binary(bytes.into())).await
     }
 
-    /// The state of the run says of each client whether it may write.
+    /// The state of the run with the permission of this client to write.
     fn run_state(&self, message: &Stored) -> Stored {
         let mut state: Value = serde_json::from_slice(&message.data).unwrap_or_default();
         state["may_write"] = (self.trusted && self.hub.may_write(self.number, false)).into();
         Stored { data: state.to_string().into_bytes(), ..message.clone() }
     }
 
-    /// Says that messages were left out, and sends what stands.
+    /// Reports that messages were omitted, and sends the last ones again.
     async fn behind(&mut self, socket: &mut WebSocket) -> Goes {
         let mut told =
             protocol::status(0, "messages were left out: this client reads more slowly than the run goes");

@@ -429,7 +429,7 @@ impl<'a> Live<'a> {
         Ok(())
     }
 
-    /// All that clients know is to be read again.
+    /// Makes clients read all data again.
     fn restarted(&mut self, state: State) {
         self.state = state;
         self.steps_left = None;

@@ -36,7 +36,7 @@ pub fn parse_wheel(text: &str) -> Result<Wheel, String> {
 pub struct WheelTests {
     /// In the order of the file.
     pub points: Vec<WheelPoint>,
-    /// Rows left out because the wheel is braked: slip sinkage knows driven wheels only.
+    /// Rows left out because the wheel is braked: slip sinkage is defined for driven wheels only.
     pub braked: usize,
 }
 

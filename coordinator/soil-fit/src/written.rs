@@ -4,7 +4,7 @@ use super::{Known, LawFit, PlateTests, SoilFit};
 use serde_json::{Value, json as value};
 use terraglue_soil_identification::{Basis, Interval};
 
-/// Significant digits of what is written: more than any plate test knows.
+/// Rounds to the significant digits of the output: more than any plate test resolves.
 pub(super) fn digits(x: f64) -> String {
     if x == 0.0 {
         return "0.0".into();

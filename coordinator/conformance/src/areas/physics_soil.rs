@@ -72,7 +72,7 @@ impl Work {
         for ((before, after), v) in self.before.iter().zip(&fixture.moved).zip(velocities) {
             let work = -0.5 * h * (dot(before.force, *v) + dot(after.force, *v));
             // Where a foot lifts off within the step, it gives out between nothing and this much: a straight line through
-            // the corner says too much, of a spring up to an eighth of its stiffness times the step squared.
+            // the corner overestimates it, for a spring by up to an eighth of its stiffness times the step squared.
             let lifts = before.normal > 0.0 && after.normal <= 0.0 && work < 0.0;
             self.sum += if lifts { 0.0 } else { work };
             self.turned += work.abs();

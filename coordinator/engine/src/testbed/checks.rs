@@ -15,7 +15,7 @@ pub fn check_groups(scenario: &Scenario, groups: &[Group], instances: &[Instance
     check_settling(scenario, groups, instances)
 }
 
-/// FMUs know no time before their start, so none can be among what comes to rest before t = 0.
+/// FMUs have no time before their start, so none can be among the subsystems that come to rest before t = 0.
 fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
     let settle_s = scenario.time.settle_s;
     let glued = |slot: usize| groups.iter().any(|g| g.problem.members().any(|m| m == slot));

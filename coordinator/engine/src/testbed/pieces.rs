@@ -1,4 +1,4 @@
-//! Pieces of one link: what a scenario that cuts a robot must say of all its parts alike.
+//! Checks of the pieces of one link in a scenario that cuts a robot.
 //!
 //! A subsystem whose body is a piece of a divided link has `BODY.link_share`, the share of the link in it. Pieces of
 //! one name that glue of all six components welds are that link again: their shares add up to 1, and they start in one

@@ -10,7 +10,7 @@ use terraglue_subsystem::StreamInfo;
 
 /// Most bytes of all messages of a nominal step. Messages beyond it are omitted.
 const MOST_BYTES: usize = 64 << 20;
-/// Messages may come nearer to each other than their rate says by this part of a period: steps do not divide it evenly.
+/// Messages may come earlier than their rate allows by this part of a period: steps do not divide it evenly.
 const EARLY: f64 = 0.5;
 
 /// All streams of a run; empty where there are none.

@@ -12,7 +12,7 @@ pub enum Logger {
     Two(unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...)),
     /// FMI 3.0.
     Three(unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char)),
-    /// The master wants to hear nothing.
+    /// The master takes no log.
     None,
 }
 

@@ -1,7 +1,7 @@
 //! The interface Jacobian of glued bodies from directional or adjoint derivatives of their FMU.
 //!
 //! Those are of outputs at one time, so they give dA/d(wrench). A wrench that stays over the step makes dV = h·dA and
-//! dX = c·h²·dA of it, with c = ½ until two trials of the step say what the FMU's own integration makes of it.
+//! dX = c·h²·dA of it, with c = ½ until two trials of the step show the effect of the FMU's own integration.
 
 use super::axis::Axis;
 use super::motion::Motion;

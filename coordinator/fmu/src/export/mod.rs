@@ -41,7 +41,7 @@ pub struct Request {
     pub version: Version,
     /// Arrays element by element also in FMI 3.0.
     pub scalars: bool,
-    /// Who made the model, which version of it, and when, as the description says it.
+    /// Author, version and date of the model for the description.
     pub origin: Origin,
     /// Whether results of its first steps go into it.
     pub reference: bool,

@@ -108,7 +108,7 @@ struct Start {
 /// Makes an instance in a worker of its own.
 ///
 /// # Errors
-/// No worker can be started, or what the instance itself says or does while it is made.
+/// No worker can be started, or the instance fails while it is made.
 pub fn start(
     what: What,
     host: &Arc<dyn Host>,

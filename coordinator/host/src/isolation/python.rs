@@ -51,7 +51,7 @@ pub fn ask_where(child: u32, folder: &Path) {
     }
 }
 
-/// The end of what the interpreter said on its own.
+/// The end of the interpreter's own messages.
 pub fn last_words(folder: &Path) -> String {
     let text = std::fs::read(folder.join(DIARY)).unwrap_or_default();
     let text = String::from_utf8_lossy(&text);

@@ -107,7 +107,7 @@ fn distance(s: &Summary) -> Option<Card> {
     Some(Card::new("Distance", (number(d, 4), "m".into()), more))
 }
 
-/// Electrical where a drive with losses says it, else the work of the motors.
+/// Electrical where a drive with losses reports it, else the work of the motors.
 fn energy_per_metre(s: &Summary) -> Option<Card> {
     let cost =
         |c: Option<f64>| c.map_or_else(String::new, |c| format!("; cost of transport {}", number(c, 3)));

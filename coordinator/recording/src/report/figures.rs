@@ -137,7 +137,7 @@ fn gluing(recording: &Recording) -> Option<Figure> {
         .log(true),
     ];
     let mut note = String::from("Largest of all steps since the record before.");
-    // of a single pass neither says anything
+    // of a single pass neither is meaningful
     if rows.iter().any(|g| g.since_last.max_gap_m.is_some()) {
         let gap = column(&|w| w.max_gap_m.unwrap_or(f64::NAN));
         panels.insert(1, Panel::new("gap", "m", vec![Curve::new("largest gap", 0, &t, gap)]).log(true));

@@ -1,6 +1,6 @@
 //! System structures (SSP) as scenarios: every FMU becomes a subsystem, every way between two a connection.
 //!
-//! The scenario says the same as the structure in our words, so that it can be kept, read and edited.
+//! The scenario is equivalent to the structure in our keys, so that it can be kept, read and edited.
 
 mod network;
 mod values;

@@ -11,7 +11,7 @@ fn main() {
     println!("cargo:rustc-env=TERRAGLUE_VERSION={}", version(&root));
 }
 
-/// `0.1.0 (a546a18d01)`. Where git or its folder is missing the variable `TERRAGLUE_COMMIT` says the commit, or nothing does.
+/// `0.1.0 (a546a18d01)`. Where git or its folder is missing the variable `TERRAGLUE_COMMIT` gives the commit, if it is set.
 fn version(root: &Path) -> String {
     println!("cargo:rerun-if-env-changed=TERRAGLUE_COMMIT");
     let number = env!("CARGO_PKG_VERSION");

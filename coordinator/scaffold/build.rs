@@ -38,7 +38,7 @@ fn crates(root: &Path) -> String {
     list + "]"
 }
 
-/// A manifest that stands alone: what it takes from the workspace is written out.
+/// A self-contained manifest: keys inherited from the workspace are written out.
 fn manifest(folder: &Path, workspace: &str) -> String {
     let own = text(&folder.join("Cargo.toml")).replace("[lints]\nworkspace = true\n", "");
     let line = |line: &str| match line.split_once(".workspace = true") {

@@ -11,7 +11,7 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Numbers TGnn that stand after `before` in a text.
+/// Numbers TGnn after `before` in a text.
 fn numbers(text: &str, before: &str) -> BTreeSet<String> {
     let numbered = |rest: &&str| {
         let digits = rest.strip_prefix("TG").map(|digits| digits.chars().take(2));

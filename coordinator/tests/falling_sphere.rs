@@ -90,7 +90,7 @@ fn a_snapshot_brings_the_same_bits_back() {
 }
 
 /// Both sides of the interface are booked by their own wrenches: where the soil's law carries another force than the body
-/// feels, the work of the interface says so.
+/// feels, the work of the interface shows it.
 #[test]
 fn the_work_of_the_interface_is_that_of_both_sides() {
     let fallen = |strategy: &str| {

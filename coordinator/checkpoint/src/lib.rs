@@ -40,16 +40,16 @@ pub struct Checkpoint {
     every_s: f64,
     csv: bool,
     t_s: f64,
-    /// What a clock measured up to here.
+    /// Wall times measured up to here.
     timing: Vec<TimingRow>,
     testbed: Block,
     recorder: RecorderState,
 }
 persist!(Checkpoint { origin, every_s, csv, t_s, timing, testbed, recorder });
 
-/// Where a run that was taken up again stood.
+/// State of a run that is resumed.
 pub struct Resumed {
-    /// What a clock measured before.
+    /// Wall times measured before.
     pub timing: Vec<TimingRow>,
     options: RecorderOptions,
     recorder: RecorderState,
@@ -197,7 +197,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// What the checkpoint speaks of is on the disk before it is, also where the power fails.
+    /// Puts the files of the recording on the disk before the checkpoint, also where the power fails.
     fn sync_recording(&self) -> std::io::Result<()> {
         let files = if self.csv { &[RECORDING, VARIABLES][..] } else { &[RECORDING] };
         files.iter().try_for_each(|name| File::open(self.path.with_file_name(name))?.sync_data())
@@ -243,7 +243,7 @@ mod tests {
         replace(&path, b"first").expect("written");
         replace(&path, b"second").expect("written");
         assert_eq!(std::fs::read(&path).expect("there"), b"second");
-        // the part cannot be created: a folder stands in its place
+        // the part cannot be created: there is a folder in its place
         std::fs::create_dir(path.with_extension("part")).expect("made");
         assert!(replace(&path, b"third").is_err());
         assert_eq!(std::fs::read(&path).expect("there"), b"second");

@@ -1,4 +1,4 @@
-//! What a run was made of: its scenario, the files and the modules. Only the same things go on to the same bytes.
+//! Origin of a run: its scenario, files and modules. Only with the same origin a run resumes to the same bytes.
 
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::fingerprint;

@@ -1,8 +1,8 @@
 //! Commands in a process of their own. `terraglue fmu run --isolate`: the same command in a process of its own.
 //!
-//! Its rows come through a pipe of their own, which stands where its standard input was; all else that it writes goes to standard
-//! error, within bounds. It notes the time of each row in a file, so the process that waits knows how far it has come and whether it
-//! goes on.
+//! Its rows come through a pipe of their own, in the place of its standard input; all else that it writes goes to standard
+//! error, within bounds. It notes the time of each row in a file, so the process that waits knows how far it has come and
+//! whether it goes on.
 
 use super::Exit;
 use super::arguments::FmuRunArguments;
@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Variable with the file that a command writes when it has done all of its work.
 const DONE: &str = "TERRAGLUE_DONE";
 
-/// Whether another process waits for this one and tells how it ended.
+/// Whether another process waits for this one and reports how it ended.
 pub fn is_child() -> bool {
     std::env::var_os(DONE).is_some()
 }
@@ -46,7 +46,7 @@ pub fn end_with_parent() {
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
 }
 
-/// Tells the process that waits for this one, if there is one, that all was done and said, with this exit code.
+/// Notifies the process that waits for this one, if there is one, that all work and output is done, with this exit code.
 pub fn done(code: u8) {
     if let Some(path) = std::env::var_os(DONE) {
         // Where it cannot be written, the process counts as lost.
@@ -60,10 +60,10 @@ const MOST_OUTPUT: usize = 1 << 20;
 /// File with the time of the last row.
 const REACHED: &str = "reached";
 
-/// What a process writes to the one that waits for it. It owns no descriptor: an FMU may close what is not its own.
+/// Report of a process to the one that waits for it. It owns no descriptor: an FMU may close those of others.
 pub struct Report {
     reached: PathBuf,
-    /// Rows so far: a change says that it goes on.
+    /// Rows so far: a change means that it goes on.
     count: u64,
 }
 
@@ -99,7 +99,7 @@ fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
     std::thread::spawn(move || {
         let mut left = MOST_OUTPUT;
         let mut bytes = [0; 8192];
-        // a process that is gone has no more to say
+        // a process that is gone writes no more
         while let Ok(count @ 1..) = from.read(&mut bytes) {
             let shown = count.min(left);
             drop(std::io::stderr().write_all(&bytes[..shown]));
@@ -111,7 +111,7 @@ fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
     })
 }
 
-/// Sends rows on to standard output; says when nobody reads them any more, as after `head`.
+/// Sends rows on to standard output; sets `unread` when nobody reads them any more, as after `head`.
 fn send_rows(mut from: PipeReader, unread: Arc<AtomicBool>) -> JoinHandle<()> {
     std::thread::spawn(move || {
         let mut out = std::io::stdout().lock();
@@ -182,7 +182,7 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         );
         return Ok(lost(&why));
     };
-    // How it ended is believed where the command itself says so: its errors are told then.
+    // The exit code is trusted where the command itself has written it: its errors are reported then.
     let said = std::fs::read_to_string(folder.path().join(DONE)).ok().and_then(|t| t.parse().ok());
     Ok(match status.code().filter(|code| said == Some(*code)) {
         Some(0) => Exit::Done,

@@ -15,7 +15,7 @@ use terraglue_scaffold::{Kind, Language};
 #[derive(Parser, Debug)]
 #[command(name = "terraglue", version = terraglue_checkpoint::VERSION, after_help = EXAMPLES, disable_help_subcommand = true)]
 pub struct Arguments {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -110,7 +110,7 @@ pub enum Command {
     },
 }
 
-/// What `variables` takes.
+/// Arguments of `variables`.
 #[derive(Args, Debug, Clone)]
 pub struct VariablesArguments {
     /// The scenario.
@@ -123,7 +123,7 @@ pub struct VariablesArguments {
     pub json: bool,
 }
 
-/// What `check` takes.
+/// Arguments of `check`.
 #[derive(Args, Debug, Clone)]
 pub struct CheckArguments {
     /// The scenario.
@@ -134,7 +134,7 @@ pub struct CheckArguments {
     pub strict: bool,
 }
 
-/// What `run` and `compare` take.
+/// Arguments of `run` and `compare`.
 #[derive(Args, Debug, Clone)]
 pub struct RunArguments {
     /// The scenario.
@@ -161,10 +161,10 @@ pub struct RunArguments {
     pub json: bool,
 }
 
-/// What stands for the scenario of a run that is resumed; the checkpoint knows it.
+/// Placeholder for the scenario of a run that is resumed; the checkpoint contains it.
 const AS_KEPT: &str = "as kept with the checkpoint";
 
-/// What `run` takes.
+/// Arguments of `run`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = RUN_EXAMPLES)]
 #[command(mut_arg("scenario", |a| a.required(false).required_unless_present("resume")
@@ -212,7 +212,7 @@ Examples:
   terraglue run scenarios/moon_walk.toml --duration 60 --checkpoint-every 5s --out runs/long
   terraglue run --resume runs/long      after a crash, a kill or Ctrl-C: the files end as if nothing had happened";
 
-/// Multiples of shorter times are no longer told apart from each other in a long run, s.
+/// Multiples of shorter times cannot be distinguished in a long run, s.
 const SHORTEST_S: f64 = 1e-6;
 
 /// A time in seconds, or with a unit.
@@ -225,7 +225,7 @@ fn simulated_time(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "a time of a microsecond at least is wanted: 5, 5s, 500ms, 2min or 1h".to_owned())
 }
 
-/// What `convert` takes.
+/// Arguments of `convert`.
 #[derive(Args, Debug, Clone)]
 pub struct ConvertArguments {
     /// The structure, or a scenario of FMUs.
@@ -237,7 +237,7 @@ pub struct ConvertArguments {
     pub output: Option<PathBuf>,
 }
 
-/// What `export` takes.
+/// Arguments of `export`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = EXPORT_EXAMPLES)]
 pub struct ExportArguments {
@@ -285,7 +285,7 @@ Examples:
 A module is exported inside a small scenario: [time], [world], and [robot], [unit] or, for a soil, [soil] with
 [terrain], [gluing] and [foot] (count, shape, radius_m, half_extents_m, …). --set changes any key of it.";
 
-/// What `check-module` takes.
+/// Arguments of `check-module`.
 #[derive(Args, Debug, Clone)]
 pub struct CheckModuleArguments {
     /// File of the module (lib…_plugin.so, ….py), a folder that holds one, or a name that `terraglue modules` lists.
@@ -321,7 +321,7 @@ pub struct CheckModuleArguments {
     /// List the tests.
     #[arg(long)]
     pub list: bool,
-    /// Build the sources of a module in C or C++ with the compiler's sanitizers instead, and tell what they find in the tests.
+    /// Build the sources of a module in C or C++ with the compiler's sanitizers instead, and report findings of the tests.
     #[arg(long)]
     pub sanitize: bool,
     /// A source for --sanitize [default: those beside the module]. May be repeated.
@@ -338,7 +338,7 @@ pub struct CheckModuleArguments {
     pub state: Option<PathBuf>,
 }
 
-/// What `robot` takes.
+/// Arguments of `robot`.
 #[derive(Args, Debug, Clone)]
 pub struct RobotArguments {
     /// URDF, xacro or MJCF.
@@ -358,11 +358,11 @@ pub struct RobotArguments {
     pub json: bool,
 }
 
-/// What `new` takes.
+/// Arguments of `new`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = NEW_EXAMPLES)]
 pub struct NewArguments {
-    /// What to make.
+    /// Kind of the module to make, or `scenario`.
     #[arg(value_parser = one_of(New::ALL, New::word))]
     pub kind: New,
     /// Name of the module and of its folder, e.g. my-soil; of a scenario: its folder [default: as the robot file].
@@ -371,7 +371,7 @@ pub struct NewArguments {
     /// Language [default: rust; a law: scenario].
     #[arg(long, value_parser = one_of(Language::ALL, Language::word))]
     pub lang: Option<Language>,
-    /// Of a scenario: the robot that stands there (URDF, xacro or MJCF).
+    /// Of a scenario: the robot in it (URDF, xacro or MJCF).
     #[arg(long, value_name = "FILE")]
     pub robot: Option<PathBuf>,
     /// Of a scenario: the folder for it.
@@ -384,7 +384,7 @@ Examples:
   terraglue new soil my-soil --lang c
   terraglue new scenario --robot my.urdf -o my-moon     it stands on the Moon";
 
-/// What `new` makes.
+/// Kinds that `new` makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum New {
     /// A module.
@@ -423,7 +423,7 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// What `fit-soil` takes.
+/// Arguments of `fit-soil`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = FIT_EXAMPLES)]
 pub struct FitSoilArguments {
@@ -476,7 +476,7 @@ Example:
 The error is the root of the mean square of ln(p/p_measured). b is the radius of a disc or the short side of a
 rectangle. Confidence intervals: whole presses are left out in turn.";
 
-/// What `compare` takes.
+/// Arguments of `compare`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = COMPARE_EXAMPLES)]
 pub struct CompareArguments {
@@ -496,7 +496,7 @@ pub struct CompareArguments {
     /// Communication steps in seconds, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "SECONDS", allow_negative_numbers = true)]
     pub steps: Vec<f64>,
-    /// Print all figures, not only those that tell most.
+    /// Print all figures, not only the main ones.
     #[arg(long, visible_alias = "all")]
     pub details: bool,
     /// Compare the path of the reported body with this: a strategy, e.g. `monolithic`, run on each soil (of several
@@ -577,7 +577,7 @@ fn parse_vary(text: &str) -> Result<(String, Vec<String>), String> {
     }
 }
 
-/// What can be done with a functional mock-up unit.
+/// Commands for a functional mock-up unit.
 #[derive(Subcommand, Debug)]
 pub enum FmuCommand {
     /// Run an FMU alone and write its outputs as a table.
@@ -603,7 +603,7 @@ pub enum FmuCommand {
     },
 }
 
-/// What `fmu run` takes.
+/// Arguments of `fmu run`.
 #[derive(Args, Debug, Clone)]
 pub struct FmuRunArguments {
     /// The FMU.
@@ -624,16 +624,16 @@ pub struct FmuRunArguments {
     /// A start value. May be repeated.
     #[arg(long = "start", value_name = "NAME=VALUE", value_parser = parse_set)]
     pub start: Vec<(String, String)>,
-    /// Time at the start, s [default: what the FMU wants, else 0].
+    /// Time at the start, s [default: that of the FMU, else 0].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub start_time: Option<f64>,
-    /// Time at the end, s [default: what the FMU wants, else 1].
+    /// Time at the end, s [default: that of the FMU, else 1].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub stop: Option<f64>,
-    /// Communication step, s [default: what the FMU wants, else a 500th of the run].
+    /// Communication step, s [default: that of the FMU, else a 500th of the run].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Relative tolerance [default: what the FMU wants].
+    /// Relative tolerance [default: that of the FMU].
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Switch categories of its own log on, separated by commas; `all` for all of them. `fmu info` lists them.

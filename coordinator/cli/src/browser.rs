@@ -33,7 +33,7 @@ pub fn browser(what: &str) -> Result<PathBuf> {
     })
 }
 
-/// What a browser did not do, and what helps.
+/// Error about a browser that failed at `what`, and the way out.
 pub fn failed(browser: &Path, what: &str) -> Error {
     let message = format!("`{}` {what}", browser.display());
     InputError::plain(message, Some(format!("name another browser in {BROWSER}"))).into()

@@ -60,7 +60,7 @@ fn options(arguments: &CheckModuleArguments) -> Result<Options> {
     })
 }
 
-/// What the sanitizers find in the sources.
+/// Prints the findings of the sanitizers in the sources.
 fn sanitized(arguments: &CheckModuleArguments, path: &Path) -> Result<Exit> {
     let wrong = |text: String| InputError::plain(text, None);
     let sources = match arguments.sources.as_slice() {

@@ -86,7 +86,7 @@ fn exit(rows: &[CompareRow], is_shown: bool) -> Exit {
     let started = |row: &&CompareRow| row.error.as_ref().is_none_or(|e| !e.starts_with(plan::REFUSED));
     let failed = rows.iter().filter(started).filter_map(|row| Some((row.name(), row.failure()?)));
     let failed: Vec<(String, String)> = failed.collect();
-    // the table tells it, too
+    // the table shows it, too
     for (name, why) in failed.iter().filter(|_| !is_shown) {
         eprintln!("error: {name}: {why}");
     }
@@ -105,7 +105,7 @@ fn exit(rows: &[CompareRow], is_shown: bool) -> Exit {
     Exit::Failed
 }
 
-/// What is about to run, in words.
+/// The runs about to start, in words.
 fn announced(plans: &[Plan]) -> String {
     let runs = plans.iter().filter(|p| p.refused.is_none()).count();
     let references = plans.iter().filter(|p| p.row.is_reference).count();
@@ -133,7 +133,7 @@ fn judge(rows: &mut [CompareRow], arguments: &CompareArguments) -> Result {
 /// Longest part of the name of a folder that a value takes.
 const LONGEST_VALUE: usize = 40;
 
-/// What the folder of a run is called.
+/// Name of the folder of a run.
 fn folder_name(row: &CompareRow) -> String {
     let reference = if row.is_reference { "reference_" } else { "" };
     let soil = if row.soil.is_empty() { String::new() } else { format!("_{}", file_name(&row.soil)) };
@@ -226,7 +226,7 @@ fn recorded(
     };
     let outcome = run::run_testbed(testbed, None, records, &mut progress)?;
     let written = recording::report::write(&plan.folder);
-    // a run that failed tells why, and not that it left too little for a report
+    // a run that failed reports why, and not that it left too little for a report
     if outcome.error.is_none() {
         written?;
     }

@@ -47,7 +47,7 @@ pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// What goes before the files of FMUs, seen from the scenario: a folder for those of an archive.
+/// Prefix of the files of FMUs, seen from the scenario: a folder for those of an archive.
 fn prefix(package: &Package, out: &Path) -> Result<String> {
     if package.is_archive() {
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();

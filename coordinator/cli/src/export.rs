@@ -9,7 +9,7 @@ use terraglue_fmi::Version;
 use terraglue_fmi::export::Origin;
 use terraglue_fmu::export::{Request, write};
 
-/// The date that builds which can be repeated are told, in the form of FMI.
+/// The date of reproducible builds (`SOURCE_DATE_EPOCH`), in the form of FMI.
 fn source_date() -> Option<String> {
     let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
     Some(DateTime::from_timestamp(seconds, 0)?.format(DATE).to_string())

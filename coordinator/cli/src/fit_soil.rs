@@ -14,7 +14,7 @@ use terraglue_soil_fit::{
 };
 use terraglue_soil_law::PRESSURE_LAWS;
 
-/// A fit to fewer readings tells nothing.
+/// A fit to fewer readings is meaningless.
 const FEWEST: usize = 4;
 
 /// Fits, writes what was asked for and prints.

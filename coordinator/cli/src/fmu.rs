@@ -29,7 +29,7 @@ pub fn fmu(command: &FmuCommand) -> Result<Exit> {
 
 fn input(message: impl ToString) -> Error {
     let message = message.to_string();
-    // what the system says has a cure of its own
+    // an error of the system has a cure of its own
     let help = (!message.contains("(os error "))
         .then(|| "docs/fmi.md tells what is read of FMUs, and how they are run".into());
     InputError::plain(message, help).into()
@@ -100,7 +100,7 @@ fn traced(path: &Path) -> Result<Trace> {
     trace::to_file(path).map_err(|source| Error::File { path: path.display().to_string(), source })
 }
 
-/// What the options say of a run.
+/// Settings of a run from the options.
 fn settings(arguments: &FmuRunArguments) -> Result<Settings> {
     Ok(Settings {
         start: arguments.start.clone(),
@@ -141,7 +141,7 @@ fn failed(fmu: &Path, error: &FmiError) -> Exit {
     exit
 }
 
-/// What was written so far is on disk: code of the FMU that could crash comes next.
+/// Puts all rows so far on disk: code of the FMU that could crash comes next.
 fn keep(tables: &[TableFile]) -> terraglue_fmi::Result {
     tables
         .iter()

@@ -1,4 +1,4 @@
-//! `terraglue fmu info`: what an FMU says of itself, as tables or as JSON. None of its code runs.
+//! `terraglue fmu info`: the description of an FMU, as tables or as JSON. None of its code runs.
 
 use super::Exit;
 use super::output::outln;

@@ -7,7 +7,7 @@ use terraglue_diagnostics::{Error, Result};
 use terraglue_recording::{RECORDING, SUMMARY};
 use terraglue_scenario::InputError;
 
-/// The folder of `--out`, or `runs/<name>`, after an earlier run there was renamed to `.1`, `.2`, …, which standard error tells.
+/// The folder of `--out`, or `runs/<name>`, after an earlier run there was renamed to `.1`, `.2`, …, as standard error reports.
 pub fn results_folder(out: Option<&Path>, name: &str) -> Result<PathBuf> {
     let folder = out.map_or_else(|| Path::new("runs").join(name), Path::to_owned);
     // without a slash at its end, which would lead into it
@@ -20,7 +20,7 @@ pub fn results_folder(out: Option<&Path>, name: &str) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// What tells the results of a run or of a comparison.
+/// Files that identify the results of a run or of a comparison.
 const RESULTS: [&str; 3] = [RECORDING, SUMMARY, COMPARE_JSON];
 
 /// Whether there are results in the folder; one with other files only is refused.

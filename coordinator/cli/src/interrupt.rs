@@ -12,7 +12,7 @@ const INTERRUPTED: i32 = 130;
 /// How late a signal is noticed at most.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// What signals have asked for, and whether there is something to close.
+/// Whether a signal has asked for an end, and whether there is a run to close.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,

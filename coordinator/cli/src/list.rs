@@ -178,8 +178,8 @@ fn unknown(name: &str, search: &SearchPath) -> terraglue_diagnostics::Error {
     InputError::plain(told, Some("`terraglue modules` lists those that are found".into())).into()
 }
 
-/// What the section of one module says, in this process; what only its code knows, its parameters, is asked for in
-/// another one.
+/// Shows the description in the section of one module, in this process; its parameters, which only its code knows, come
+/// from another one.
 fn shown(name: &str, search: &SearchPath, module_path: &[PathBuf]) -> Result<Exit> {
     let m = match is_path(name) {
         true => listed_file(Path::new(name)).map_err(wrong)?,
@@ -223,7 +223,7 @@ fn shown(name: &str, search: &SearchPath, module_path: &[PathBuf]) -> Result<Exi
     Ok(Exit::Done)
 }
 
-/// Lets another process load a module and show what it takes; what becomes of that process is told.
+/// Lets another process load a module and show its parameters; reports how that process ended.
 fn parameters(name: &str, module_path: &[PathBuf]) {
     let mut command = std::process::Command::new("/proc/self/exe");
     command.args(["modules", name, "--asked"]).stdin(std::process::Stdio::null());
@@ -278,7 +278,7 @@ fn listing(part: Option<&str>, search: &SearchPath) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// What a check said, and with which version of the program.
+/// Result of a check, with its seed and the version of the program.
 fn told(last: &LastCheck) -> String {
     format!("{} (seed {}, terraglue {})", last.summary, last.seed, last.version)
 }

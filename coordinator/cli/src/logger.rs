@@ -1,6 +1,6 @@
 //! Log lines of modules and of the library on standard error: warnings and errors, and all with `TERRAGLUE_LOG=info`.
 //!
-//! Several runs side by side say the same many times over: their warnings are collected, and each is told once.
+//! Several runs side by side log the same many times over: their warnings are collected, and each is printed once.
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
 use std::cell::RefCell;
@@ -15,7 +15,7 @@ impl Log for Logger {
 
     fn log(&self, record: &Record) {
         if self.enabled(record.metadata()) {
-            // an error that a module or FMU speaks of is not yet one of the program
+            // an error that a module or FMU logs is not yet one of the program
             let said = ["terraglue::module", "terraglue_fmu"].contains(&record.target());
             let by = if said && record.level() == Level::Error { "logged " } else { "" };
             let level = match record.level() {
@@ -52,7 +52,7 @@ fn with<T>(work: impl FnOnce(&mut Option<Collected>) -> T) -> T {
     work(&mut COLLECTED.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// While this lives, warnings are collected; those that are left are told at its end.
+/// While this lives, warnings are collected; those that are left are printed at its end.
 pub struct Collecting(());
 
 /// Collects warnings from here on.
@@ -63,7 +63,7 @@ pub fn collect() -> Collecting {
 }
 
 impl Collecting {
-    /// Tells what has been collected so far; it is not told again.
+    /// Prints the warnings collected so far; they are not printed again.
     pub fn tell(&self) {
         with(|all| all.iter_mut().flat_map(Collected::lines).collect::<Vec<_>>())
             .iter()
@@ -78,10 +78,10 @@ impl Drop for Collecting {
     }
 }
 
-/// While this lives, what this thread says is of one run.
+/// While this lives, log lines of this thread belong to one run.
 pub struct OfRun(());
 
-/// What this thread says from here on is of the run of that name.
+/// Log lines of this thread from here on belong to the run of that name.
 #[must_use]
 pub fn of_run(name: &str) -> OfRun {
     with(|all| all.iter_mut().for_each(|all| all.begin(name)));
@@ -130,7 +130,7 @@ impl Collected {
         }
     }
 
-    /// What has not been told, each with its runs.
+    /// Warnings that were not printed yet, each with its runs.
     fn lines(&mut self) -> Vec<String> {
         let all = self.runs.len();
         let untold = self.warnings.iter_mut().filter(|w| !w.told);

@@ -18,21 +18,21 @@ pub fn bar(steps: u64, quiet: bool) -> ProgressBar {
     ProgressBar::new(steps).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// How long nothing is said of what takes time, how often it is said again where no terminal is, and how often on one.
+/// Delay of the first message about work that takes time, its period without a terminal, and its period on one.
 const FIRST_LINE: Duration = Duration::from_secs(2);
 /// See [`FIRST_LINE`].
 const SAY_EVERY: Duration = Duration::from_secs(60);
 /// See [`FIRST_LINE`].
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
-/// While this lives, what takes longer than two seconds is said: on a terminal in the bar, else in lines.
+/// While this lives, work that takes longer than two seconds is reported: on a terminal in the bar, else in lines.
 pub struct Waiting {
     done: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Waiting {
-    /// Waits for what `what` says.
+    /// Shows the text of `what` while it lasts.
     pub fn new(quiet: bool, bar: ProgressBar, what: impl Fn() -> String + Send + 'static) -> Self {
         let done = Arc::new(AtomicBool::new(quiet));
         let ended = Arc::clone(&done);
@@ -69,8 +69,8 @@ impl Waiting {
         Self::new(quiet, bar, || "loading robots, soils and modules".into())
     }
 
-    /// From what was loaded to the end of the first step; `standing`: see [`terraglue_engine::testbed::Options`]; `label`
-    /// stands before it.
+    /// From the end of loading to that of the first step; `standing`: see [`terraglue_engine::testbed::Options`]; `label`
+    /// precedes the text.
     pub fn standing(quiet: bool, bar: &ProgressBar, standing: Arc<AtomicU64>, label: &str) -> Self {
         let label = label.to_owned();
         Self::new(quiet, bar.clone(), move || match f64::from_bits(standing.load(Ordering::Relaxed)) {
@@ -93,7 +93,7 @@ impl Drop for Waiting {
 
 /// Moves a bar along with a run.
 pub struct Progress {
-    /// Says what goes on up to the end of the first step.
+    /// Reports the work up to the end of the first step.
     waiting: Option<Waiting>,
     bar: ProgressBar,
     /// When the first step was done, and its time, s.
@@ -103,7 +103,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Follows a run of `duration_s` seconds; `label` stands before the time.
+    /// Follows a run of `duration_s` seconds; `label` precedes the time.
     pub fn new(bar: ProgressBar, duration_s: f64, label: &str) -> Self {
         Self { waiting: None, bar, since: None, duration_s, label: label.into() }
     }

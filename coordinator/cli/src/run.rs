@@ -22,15 +22,15 @@ use terraglue_reload::{ReloadOptions, Reloader};
 use terraglue_scenario::{InputError, Scenario};
 use terraglue_serve::SharedRecorder;
 
-/// What a run leaves behind beside its files.
+/// Outcome of a run beside its files.
 pub struct Outcome {
     /// Figures.
     pub summary: Summary,
-    /// What stopped it early.
+    /// The error that stopped it early.
     pub error: Option<Error>,
     /// Wall time per step of the exchange, of Jacobians, and of all else, s.
     pub parts_s: [f64; 3],
-    /// What each subsystem cost, s.
+    /// Wall time of each subsystem, s.
     pub costs: Vec<(String, f64)>,
     /// Values at the end of the variables that were asked for; those that are no numbers are left out.
     pub asked: Vec<(String, f64)>,
@@ -152,7 +152,7 @@ fn say(arguments: &RunArguments, text: &str) {
     }
 }
 
-/// What watches the modules, where that is wanted.
+/// The reloader that watches the modules, where that is wanted.
 fn reloader(command: &RunCommand, scenario: &Scenario, options: &Options) -> Result<Option<Reloader>> {
     if !command.watch {
         return Ok(None);
@@ -169,7 +169,7 @@ fn reloader(command: &RunCommand, scenario: &Scenario, options: &Options) -> Res
     Reloader::new(scenario, options, wanted).map(Some)
 }
 
-/// What a run is recorded into, and from where on.
+/// Targets of the recording of a run, and where it resumes.
 pub struct Records<'a> {
     /// The scenario.
     pub scenario: &'a Scenario,
@@ -177,9 +177,9 @@ pub struct Records<'a> {
     pub folder: &'a Path,
     /// Whether `variables.csv` is written.
     pub csv: bool,
-    /// What writes checkpoints, where they are asked for.
+    /// Writer of checkpoints, where they are asked for.
     pub keeper: Option<Keeper>,
-    /// Where the run stood, if it goes on; the testbed is there already.
+    /// State of a run that is resumed; the testbed is there already.
     pub resumed: Option<Resumed>,
     /// Variables whose values at the end are asked for.
     pub asked: &'a [String],

@@ -5,7 +5,7 @@ use clap::Args;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
-/// What `serve` takes.
+/// Arguments of `serve`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = EXAMPLES)]
 pub struct ServeArguments {

@@ -3,11 +3,11 @@
 use miette::{NamedSource, SourceSpan};
 use terraglue_scenario::InputError;
 
-/// Longest message, and what is kept of a longer one at its begin and its end, in bytes.
+/// Longest message, and the parts of a longer one that are kept at its begin and its end, in bytes.
 const LONGEST_TEXT: usize = 1200;
 const HEAD: usize = 700;
 const TAIL: usize = 300;
-/// Longest line of a file that is shown, and what stands before the place that is meant, in bytes.
+/// Longest line of a file that is shown, and the part of it before the marked place, in bytes.
 const LONGEST_LINE: usize = 160;
 const BEFORE: usize = 60;
 /// Most lines of a file that are marked.

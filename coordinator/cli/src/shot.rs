@@ -1,5 +1,5 @@
-//! `terraglue shot`: a picture of a run at a time, taken by a browser that is found on this machine. It is shown the report, which
-//! needs no server; what to show stands in the address.
+//! `terraglue shot`: a picture of a run at a time, taken by a browser that is found on this machine. It opens the report, which
+//! needs no server; the address gives time, camera and ground.
 
 use super::Exit;
 use super::browser::{Room, Running, browser, failed, without_window};

@@ -3,7 +3,7 @@
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `shot` takes.
+/// Arguments of `shot`.
 #[derive(Args, Debug, Clone)]
 pub struct ShotArguments {
     /// Folder of the run, e.g. runs/moon_walk.
@@ -26,7 +26,7 @@ pub struct ShotArguments {
     pub output: PathBuf,
 }
 
-/// What the address of a page says of camera and ground, where something was asked for.
+/// Part of the address of a page with camera and ground, where they are given.
 pub fn sight(camera: Option<&str>, ground: Option<&str>) -> String {
     let said = [("camera", camera), ("ground", ground)];
     said.into_iter().filter_map(|(key, value)| Some(format!("&{key}={}", value?))).collect()

@@ -1,4 +1,4 @@
-//! What is printed: errors with their place, tables.
+//! Output of the commands: errors with their place, tables.
 
 use super::shorten;
 use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
@@ -153,7 +153,7 @@ pub fn listing(headers: &[&str]) -> Table {
     }
 }
 
-/// What each subsystem cost.
+/// Table with the wall time of each subsystem.
 pub fn costs(costs: &[(String, f64)], steps: u64) -> Table {
     let mut t = table(&["subsystem", "wall time", "per step"]);
     for (name, s) in costs {
@@ -251,7 +251,7 @@ fn drift(e: &Energies) -> String {
     format!("{drift_j:+.2e} J{share}{beyond}")
 }
 
-/// Electrical energy where a drive with losses says it, and the work of the motors.
+/// Electrical energy where a drive with losses reports it, and the work of the motors.
 fn both(electrical: Option<f64>, mechanical: Option<f64>, show: fn(f64) -> String) -> String {
     let part = |value: Option<f64>, what| Some(format!("{} {what}", show(value.filter(|e| *e > 0.0)?)));
     let all = [part(electrical, "electrical"), part(mechanical, "by the work of the motors")];

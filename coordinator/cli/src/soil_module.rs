@@ -1,4 +1,4 @@
-//! Whether a module that stands in for a soil is a soil, and whether the terrain has one at all.
+//! Checks that a module that replaces a soil is a soil, and that the terrain has one at all.
 
 use super::scenario_arguments::ScenarioArguments;
 use std::path::Path;

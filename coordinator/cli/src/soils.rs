@@ -13,7 +13,7 @@ use terraglue_scenario::{InputError, did_you_mean, find_soil_table, read_soil_ta
 const UNITS: [&str; COLUMNS.len()] =
     ["", "N/m^(n+1)", "N/m^(n+2)", "Pa", "rad", "m", "kg/m³", "Pa/m", "m/s²", "Pa"];
 
-/// What stands above the columns, of which the numbers are those of [`COLUMNS`].
+/// Headings of the columns, of which the numbers are those of [`COLUMNS`].
 const HEADS: [&str; COLUMNS.len() + 3] = [
     "soil",
     "n",

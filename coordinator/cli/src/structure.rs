@@ -43,7 +43,7 @@ pub fn write(from: &Path, to: &Path) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Refuses what a system structure cannot say.
+/// Refuses a scenario that a system structure cannot represent.
 fn fits(scenario: &Scenario) -> Result {
     let source = &scenario.source;
     let help = || Some("`terraglue export` makes one FMU of a whole scenario".to_owned());

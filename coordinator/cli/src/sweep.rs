@@ -25,7 +25,7 @@ const MOST_TRIED: usize = 16;
 /// See [`MOST_TRIED`].
 const MOST_BUILT: usize = 8;
 
-/// Does what the arguments say.
+/// Runs the command of the arguments.
 pub fn sweep(arguments: &SweepArguments) -> Result<Exit> {
     match &arguments.command {
         None => list(arguments),
@@ -156,7 +156,7 @@ fn at_key(plan: &SweepPlan, (key, value): (&String, &String), error: Error) -> E
     }
 }
 
-/// What is collected must be a variable that is a number, or a key of the summary.
+/// Checks that each collected name is a variable that is a number, or a key of the summary.
 fn known(testbed: &Testbed, scenario: &Scenario, names: &[String]) -> Result {
     if names.is_empty() {
         return Ok(());

@@ -4,11 +4,11 @@ use crate::scenario_arguments::{parse_folder, parse_set};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// What `sweep` takes.
+/// Arguments of `sweep`.
 #[derive(Args, Debug, Clone)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, after_help = EXAMPLES)]
 pub struct SweepArguments {
-    /// What to do with the sweep of a folder.
+    /// Command for the sweep of a folder.
     #[command(subcommand)]
     pub command: Option<SweepCommand>,
     /// A scenario with `[sweep]`, or a plan of its own: `scenario = "FILE.toml"` and `[sweep]`.
@@ -39,7 +39,7 @@ Examples:
   terraglue sweep scenarios/rover_slope.toml -o runs/slopes --commands | parallel -j 8
   terraglue sweep scenarios/rover_slope.toml -o runs/slopes --slurm | sbatch";
 
-/// What can be done with a sweep.
+/// Commands for a sweep.
 #[derive(Subcommand, Debug, Clone)]
 pub enum SweepCommand {
     /// Run the cases that are missing. A case is done when its result was renamed into place; one that was killed runs again.
@@ -54,7 +54,7 @@ pub enum SweepCommand {
     },
 }
 
-/// What `sweep run` takes.
+/// Arguments of `sweep run`.
 #[derive(Args, Debug, Clone)]
 pub struct SweepRunArguments {
     /// Folder of the sweep.

@@ -25,7 +25,7 @@ use terraglue_serve::{PageHost, Posted};
 const LONGEST: Duration = Duration::from_secs(180);
 /// How often the browser and Ctrl-C are looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// What is loaded by the document beside the report.
+/// Script that the document loads beside the report.
 const SCRIPT: &str = "<script type=\"module\" src=\"video.js\"></script>\n</body>";
 
 /// Makes the video.

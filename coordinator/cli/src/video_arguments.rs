@@ -4,7 +4,7 @@ use crate::shot_arguments::size;
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `video` takes.
+/// Arguments of `video`.
 #[derive(Args, Debug, Clone)]
 pub struct VideoArguments {
     /// Folder of the run, e.g. runs/moon_walk.

@@ -38,7 +38,7 @@ fn text(id: &[u8], value: &str) -> Vec<u8> {
     element(id, value.as_bytes())
 }
 
-/// What a video is.
+/// Properties of a video.
 pub struct Video<'a> {
     /// Name of the encoding, as WebM has it.
     pub codec: &'a str,
@@ -105,7 +105,7 @@ pub struct WebmFile<F> {
 }
 
 impl<F: Write + Seek> WebmFile<F> {
-    /// Writes what stands before the pictures.
+    /// Writes the header before the pictures.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -41,7 +41,7 @@ impl FigureColumn {
 }
 
 impl FigureColumn {
-    /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
+    /// Text of the cell of a row: the figure, that it is unknown or does not apply, or a dash.
     pub fn text(&self, row: &CompareRow) -> String {
         let value = (self.value)(row);
         let value = if WAYS.contains(&self.key) { value.map(without_rounding) } else { value };
@@ -59,7 +59,7 @@ impl FigureColumn {
         }
     }
 
-    /// Whether any row has something to say.
+    /// Whether any row has a value.
     pub fn is_shown(&self, rows: &[CompareRow]) -> bool {
         rows.iter().any(|row| self.text(row) != cell(None, self.unit))
     }

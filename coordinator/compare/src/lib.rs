@@ -41,13 +41,13 @@ pub struct CompareRow {
     pub strategy: String,
     /// Soil module.
     pub soil: String,
-    /// What else differs from row to row: key paths of the scenario and their values.
+    /// Other varied keys: key paths of the scenario and their values.
     pub varied: Varied,
     /// Its figures; `None` where the run could not even start.
     pub summary: Option<Summary>,
     /// Its results folder, for the curves and the link to its report.
     pub folder: Option<PathBuf>,
-    /// What went wrong.
+    /// Error message.
     pub error: Option<String>,
     /// Communication step, s.
     pub step_s: f64,
@@ -144,7 +144,7 @@ pub fn write(folder: &Path, rows: &[CompareRow]) -> Result {
     std::fs::write(&path, page::render(folder, rows, &runs)).map_err(at(&path))
 }
 
-/// The comparison for a terminal: one line per run with what tells most; `details`: all figures, one column per run.
+/// The comparison for a terminal: one line per run with the main figures; `details`: all figures, one column per run.
 pub fn terminal_table(rows: &[CompareRow], details: bool) -> String {
     if details { table::terminal(rows) } else { overview::terminal(rows) }
 }

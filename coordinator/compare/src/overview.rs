@@ -1,5 +1,5 @@
 //! The comparison at a glance, for a terminal and the head of the page: one line per run with its distance, its prints, its energy balance and its cost. It
-//! is no wider than the terminal; all figures stand in the files and behind `--details`.
+//! is no wider than the terminal; all figures are in the files and behind `--details`.
 
 use crate::columns::cell;
 use crate::table::failures;
@@ -54,7 +54,7 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     )
 }
 
-/// What a run is called by, part by part.
+/// The parts of the name of a run.
 fn parts(row: &CompareRow) -> Vec<String> {
     let reference = if row.is_reference { " (reference)" } else { "" };
     let step = if row.name_step { format!("{} ms", (1e9 * row.step_s).round() / 1e6) } else { String::new() };
@@ -63,7 +63,7 @@ fn parts(row: &CompareRow) -> Vec<String> {
     all
 }
 
-/// What stands in a cell, and how it is marked.
+/// Text of a cell, and how it is marked.
 pub(crate) struct CellText {
     pub text: String,
     /// The best of its column.

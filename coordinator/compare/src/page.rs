@@ -97,7 +97,7 @@ pub(crate) fn open(rows: &[CompareRow]) -> Vec<Run> {
     rows.iter().enumerate().filter_map(one).collect()
 }
 
-/// What is asked first, as in the terminal.
+/// The main figures, as in the terminal.
 fn glance(folder: &Path, rows: &[CompareRow]) -> String {
     let mut out =
         String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr><th class=\"name\">run</th>");

@@ -28,7 +28,7 @@ pub fn judge(rows: &mut [CompareRow], like: Option<&CompareRow>, folder: &Path) 
     Ok(())
 }
 
-/// Orders of the figures of whole runs, where the reference tells them too.
+/// Orders of the figures of whole runs, where the reference has them too.
 fn figure_orders(rows: &mut [CompareRow], like: Option<&CompareRow>, truth: &Summary) {
     type Figure = fn(&Summary) -> Option<f64>;
     type Place = fn(&mut Orders) -> &mut Option<f64>;

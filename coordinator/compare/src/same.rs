@@ -98,7 +98,7 @@ mod tests {
     const TEXT: &str = "[time]\nstep_s = 0.001\nduration_s = 1.0\n[gluing]\nstrategy = \"iterative\"\n[soil]\n\
         module = \"soil-bekker\"\nisolate = false\n";
 
-    /// What is found against a reference with this text that ends at this time.
+    /// Differences found against a reference with this text that ends at this time.
     fn against(text: &str, end_s: f64) -> Vec<String> {
         let scenario = Scenario::parse(TEXT, "walk.toml", &[]).expect("good");
         let mut recording = Recording::default();

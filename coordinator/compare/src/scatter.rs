@@ -61,7 +61,7 @@ fn style(colour: usize) -> (&'static str, &'static str, &'static str, char) {
     }
 }
 
-/// The diagram; none where no series has a point that a logarithm knows.
+/// The diagram; none where no series has a point with positive coordinates.
 pub(crate) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<String> {
     let good = |(x, y): &&(f64, f64)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite();
     let points = || series.iter().flat_map(|s| &s.points).filter(good);

@@ -7,7 +7,7 @@ use terraglue_recording::report::energy_card;
 
 /// More runs than this do not fit side by side.
 const SIDE_BY_SIDE: usize = 5;
-/// What is left of the columns where every run is a line, so that the lines fit; the files have all.
+/// Columns that are kept where every run is a line, so that the lines fit; the files have all.
 const SHORT: [&str; 9] = [
     "step_s",
     "reference_error_m",
@@ -20,7 +20,7 @@ const SHORT: [&str; 9] = [
     "cpu_per_step_s",
 ];
 
-/// All figures with one column per run; of many runs the most telling figures with one line per run.
+/// All figures with one column per run; of many runs the main figures with one line per run.
 pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED);

@@ -11,7 +11,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use terraglue_host::value_of;
 
-/// What the file says.
+/// Content of the file.
 #[derive(Clone, Debug, Default)]
 pub struct CheckFile {
     /// Parameters by dotted name.

@@ -1,4 +1,4 @@
-//! What a named test is and what it does.
+//! Definition of a named test: its properties and its function.
 
 use super::finding::Verdict;
 use super::scope::{Area, Level};
@@ -10,7 +10,7 @@ use terraglue_subsystem::Kind;
 pub struct Test {
     /// Name, unique.
     pub name: &'static str,
-    /// What it is about.
+    /// Its area.
     pub area: Area,
     /// From which level on it is run.
     pub level: Level,

@@ -6,7 +6,7 @@ use terraglue_subsystem::Port;
 /// Names of the components of a port.
 const NAMES: [&str; 6] = ["n", "t1", "t2", "mn", "mt1", "mt2"];
 
-/// What was given and what the differences say, entry by entry.
+/// The given derivative and the range of the differences, entry by entry.
 pub struct Columns {
     n: usize,
     given: Vec<f64>,
@@ -38,7 +38,7 @@ impl Columns {
             for step in [delta, -delta, 1e-3 * delta, -1e-3 * delta] {
                 let mut moved = at.to_vec();
                 moved[j] += step;
-                // What has been added, after rounding.
+                // The increment after rounding.
                 let step = moved[j] - at[j];
                 let there = answer(&moved)?;
                 for i in 0..n {

@@ -1,4 +1,4 @@
-//! What comes out of a test.
+//! Results of tests: findings and outcomes.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 pub struct Finding {
     /// Function of the interface, or what the host did.
     pub call: String,
-    /// What went in.
+    /// The input.
     pub given: String,
-    /// What came back.
+    /// The answer.
     pub got: String,
-    /// What was expected.
+    /// The expected answer.
     pub expected: String,
 }
 
@@ -35,7 +35,7 @@ pub enum Stop {
 /// Result of a test.
 pub type Verdict<T = ()> = Result<T, Stop>;
 
-/// What is expected where a call is refused.
+/// Expectation where a call was refused.
 pub const ANSWER: &str = "an answer";
 
 impl Stop {
@@ -134,7 +134,7 @@ impl Outcome {
         }
     }
 
-    /// The test that stands in the way.
+    /// The test that blocks it.
     pub fn blocked_by(&self) -> Option<&str> {
         match self {
             Self::Blocked { by } => Some(by),

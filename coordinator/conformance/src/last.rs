@@ -1,4 +1,4 @@
-//! What a module was last found to be, by the bytes of its file: `terraglue modules` shows it beside the file.
+//! The last check of a module, by the bytes of its file: `terraglue modules` shows it beside the file.
 //!
 //! One small file per module file lies in the user's cache, `$XDG_CACHE_HOME/terraglue/checks`. A module that was built anew
 //! has other bytes, and with them no last check.

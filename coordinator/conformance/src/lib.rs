@@ -1,4 +1,4 @@
-//! `terraglue check-module`: says what is wrong with a module before a robot falls over.
+//! `terraglue check-module`: finds the mistakes of a module before a robot falls over.
 //!
 //! Named tests over what a module promises in `terraglue.h`, from symbols to physics. [`check`] runs each in a process of
 //! its own with a time limit, so that a crash or an endless loop is a finding like any other; [`run_here`] runs one in

@@ -20,7 +20,7 @@ pub struct Options {
     pub jobs: usize,
     /// Time that a test may take, s.
     pub limit_s: f64,
-    /// Variables of the environment of every test; `{test}` stands for its name.
+    /// Variables of the environment of every test; `{test}` is replaced by its name.
     pub environment: Vec<(String, String)>,
 }
 

@@ -6,7 +6,7 @@ use super::test_context::TestContext;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What another process is asked to run.
+/// A run of the script for another process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RemoteRun {
     /// Steps of the script.
@@ -46,7 +46,7 @@ pub fn run_remote(context: &TestContext, remote_run: &RemoteRun) -> Verdict<Vec<
     let mut runner = Runner::new(context.instance()?)?;
     if let Some(file) = &remote_run.state {
         let bytes = std::fs::read(file).unwrap_or_default();
-        // The fixture is put where it stood by walking the same way with an instance of its own.
+        // The fixture gets back to its place by going the same way with an instance of its own.
         let mut guide = Runner::new(context.instance()?)?;
         guide.run(0..remote_run.steps.start, remote_run.variant)?;
         runner.instance_mut().deserialize(&bytes)?;

@@ -21,7 +21,7 @@ pub struct TestResult {
     pub outcome: Outcome,
     /// Time of its process, s.
     pub time_s: f64,
-    /// What repeats it, where it is broken.
+    /// Command that repeats it, where it is broken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repeat: Option<String>,
 }

@@ -1,8 +1,8 @@
 //! `check-module --sanitize`: the sources of a module in C or C++ built with the sanitizers of the system's compiler, put
-//! to the tests, and what they find told by file and line.
+//! to the tests, and their findings by file and line.
 //!
 //! The program itself is not built with them: the runtime is loaded ahead of it (`LD_PRELOAD`), so only the module is
-//! watched. What the tests themselves say does not matter here.
+//! watched. The results of the tests themselves do not matter here.
 
 use super::options::Options;
 use super::supervisor::check;
@@ -10,14 +10,14 @@ use super::{Level, Outcome};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What a sanitizer found.
+/// A finding of a sanitizer.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Fault {
     /// Source file and line.
     pub place: String,
     /// E.g. `heap-buffer-overflow`, `signed integer overflow: …`.
     pub what: String,
-    /// Function; empty where it is not told.
+    /// Function; empty where it is not given.
     pub function: String,
     /// The test that came across it.
     pub test: String,
@@ -26,11 +26,11 @@ pub struct Fault {
 /// Results of all sanitizers.
 #[derive(Clone, Debug, Default)]
 pub struct Sanitized {
-    /// What was found, by place.
+    /// Findings, by place.
     pub faults: Vec<Fault>,
-    /// What could not be looked for, and why.
+    /// Sanitizers that could not run, and why.
     pub skipped: Vec<String>,
-    /// What was looked for.
+    /// Kinds of faults that were looked for.
     pub ran: Vec<&'static str>,
 }
 
@@ -213,7 +213,7 @@ fn told(logs: &Path, test: &str) -> bool {
     entries.any(|e| e.file_name().to_string_lossy().rsplit_once('.').is_some_and(|(name, _)| name == test))
 }
 
-/// What stands in the logs, named by the tests, about these sources.
+/// Findings about these sources in the logs, which are named by the tests.
 fn found(logs: &Path, sources: &[PathBuf]) -> Vec<Fault> {
     let mut all = Vec::new();
     for entry in std::fs::read_dir(logs).into_iter().flatten().flatten() {
@@ -261,7 +261,7 @@ fn faults(text: &str, sources: &[PathBuf]) -> Vec<Fault> {
                 open = None;
             }
         } else if let (Some(frame), Some(last)) = (line.strip_prefix("#0 "), all.last_mut()) {
-            // The stack below an undefined operation; its place was told already.
+            // The stack below an undefined operation; its place was given already.
             if last.function.is_empty() {
                 let named = frame.split_once(" in ").and_then(|(_, rest)| rest.split_whitespace().next());
                 last.function = named.unwrap_or_default().into();

@@ -1,6 +1,6 @@
-//! What a test can be about, and how much is tried.
+//! Areas of tests, and levels of how much is tried.
 
-/// What a test is about.
+/// Area of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Area {

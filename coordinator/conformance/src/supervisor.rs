@@ -16,14 +16,14 @@ use std::time::{Duration, Instant};
 use terraglue_host::isolation::ForkServer;
 use terraglue_subsystem::Kind;
 
-/// What the process of a test writes into its result file.
+/// Content of the result file that the process of a test writes.
 #[derive(Serialize, Deserialize)]
 pub struct Told {
     /// How it ended.
     pub outcome: Outcome,
     /// Kind of the module, as far as it could be loaded.
     pub kind: Option<Kind>,
-    /// What is wrong with the parameters that were given, once the module has said what it takes.
+    /// Problem of the given parameters, known once the module has declared its own.
     #[serde(default)]
     pub wrong_set: Option<String>,
 }
@@ -92,8 +92,8 @@ const IN_A_SOIL: [&str; 8] = [
     "four-threads",
 ];
 
-/// Symmetries of the soil that takes a law. The law itself is told of no place and no direction, so it breaks them only by
-/// what it should not look at, and what waits for the quick tests does without.
+/// Symmetries of the soil that takes a law. The law itself receives no place and no direction, so it breaks them only by
+/// inputs that it should not read, and these tests are not among the quick ones.
 const BLIND: [&str; 6] = ["translation", "height", "quarter-turn", "any-turn", "port-frame", "far-feet"];
 
 /// Whether a test is one for laws: their own, those of any library, and the physics of the soil that takes the law.
@@ -126,7 +126,7 @@ struct Running<'a> {
 const BLINK: Duration = Duration::from_millis(100);
 
 impl Running<'_> {
-    /// Time that it has had, s. On a busy machine it stands in line for a processor: that is not its own.
+    /// Time that it has had, s, without the time that it waited for a processor on a busy machine.
     fn spent_s(&mut self, limit_s: f64) -> f64 {
         let now = Instant::now();
         self.seen += (now - self.looked).min(BLINK);
@@ -135,7 +135,7 @@ impl Running<'_> {
         if seen < limit_s { seen } else { seen - self.in_line_s() }
     }
 
-    /// How long the process stood in line for a processor, s; 0 where the system does not tell.
+    /// How long the process waited for a processor, s; 0 where the system does not report it.
     fn in_line_s(&self) -> f64 {
         let text = std::fs::read_to_string(format!("/proc/{}/schedstat", self.process.id()));
         let waited = text.ok().and_then(|t| t.split_whitespace().nth(1)?.parse::<f64>().ok());

@@ -1,4 +1,4 @@
-//! What a test works with.
+//! The test context: module, parameters, folders and seed of a test.
 
 use super::check_file::CheckFile;
 use super::finding::{Stop, Verdict};
@@ -175,8 +175,8 @@ impl TestContext {
         context.instance_on(module, ground)
     }
 
-    /// What is wrong with the parameters that were given (`--set`, or the file beside the module); None: nothing, or the
-    /// module cannot be loaded. A law takes its own numbers and those of the soil around it.
+    /// Problem of the given parameters (`--set`, or the file beside the module); None: there is none, or the module cannot
+    /// be loaded. A law takes its own numbers and those of the soil around it.
     pub fn wrong_set(&self) -> Option<String> {
         if self.sets.is_empty() {
             return None;
@@ -236,7 +236,7 @@ fn not_usable(call: &str, error: &LoadError) -> Stop {
     Stop::fail(call, "parameters of the check", error.to_string(), "success")
 }
 
-/// What is wrong with a value for the parameter of this dotted name.
+/// Problem of a value for the parameter of this dotted name.
 fn wrong_value(schema: &Schema, key: &str, value: &Value) -> Option<String> {
     let all = &schema.parameters;
     let below = |head: &str| key.strip_prefix(head).is_some_and(|rest| rest.starts_with('.'));

@@ -5,10 +5,10 @@ use crate::did_you_mean;
 use serde_json::Value;
 use terraglue_subsystem::{Parameter, ParameterType};
 
-/// What is wrong with a value; the place is the caller's business.
+/// A problem with a value; the caller adds the place.
 #[derive(Debug, PartialEq)]
 pub struct Complaint {
-    /// What is wrong.
+    /// Description of the problem.
     pub message: String,
     /// The way out.
     pub help: Option<String>,
@@ -170,7 +170,7 @@ fn typed(p: &Parameter, count: Option<usize>, ok: bool, value: &Value) -> Result
     Err(Complaint { message, help: help_line(p) })
 }
 
-/// What is said of whole numbers that TOML does not hold; an edit brings them as text.
+/// Help about whole numbers that TOML cannot hold; an edit brings them as text.
 pub const LARGEST_WHOLE: &str =
     "whole numbers of a scenario go from -9223372036854775808 to 9223372036854775807 (64 bits, signed)";
 

@@ -1,6 +1,6 @@
 //! Errors of the coordinator, split by whose turn it is: the author of the input, or the simulation.
 
-/// What stops a run.
+/// Errors that stop a run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -18,7 +18,7 @@ pub enum Error {
         function: &'static str,
         /// Simulated time, s.
         time_s: f64,
-        /// What it said.
+        /// Its message.
         message: String,
     },
     /// A glued subsystem cannot go to the end of the step; the testbed repeats it with half the length.
@@ -46,7 +46,7 @@ pub enum Error {
     Simulation {
         /// Simulated time, s.
         time_s: f64,
-        /// What happened.
+        /// Description of the failure.
         message: String,
     },
     /// There is no room for a file of the run (exit code 1).
@@ -58,7 +58,7 @@ pub enum Error {
         free: String,
         /// Simulated time up to which all was written, s.
         kept_s: f64,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// A file could not be read or written (exit code 2 where its path is wrong, else 1).

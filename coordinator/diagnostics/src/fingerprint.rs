@@ -1,6 +1,6 @@
-//! A short number that tells two contents apart.
+//! A short number that distinguishes two contents.
 
-/// FNV-1a of 64 bits (Fowler, Noll and Vo 1991): tells two builds or inputs apart; no protection against intent.
+/// FNV-1a of 64 bits (Fowler, Noll and Vo 1991): distinguishes builds or inputs; no protection against intent.
 pub fn fingerprint(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 #[error("{message}")]
 pub struct InputError {
-    /// What is wrong, with the offending value.
+    /// Description of the problem, with the offending value.
     pub message: String,
     /// File with its text.
     #[source_code]

@@ -31,8 +31,8 @@ pub struct StreamView {
     pub messages: Vec<(f64, Vec<u8>)>,
 }
 
-/// The energies of a subsystem as they enter the sum of all: what carries signals only has none, unless it says so, and a
-/// soil has no motors.
+/// The energies of a subsystem as they enter the sum of all: one that carries signals only has none, unless it reports
+/// them, and a soil has no motors.
 pub fn ledger_of(kind: Kind, energy: &Energy) -> Energy {
     let or_none = |value: f64| if value.is_nan() { 0.0 } else { value };
     match kind {

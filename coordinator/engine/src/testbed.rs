@@ -224,7 +224,7 @@ impl Testbed {
         Ok(())
     }
 
-    /// (1) What the time line has for this communication point.
+    /// (1) Events of the time line at this communication point.
     fn apply_events(&mut self) -> Result {
         let (t, h) = (self.clock.t, self.clock.step_s);
         while let Some(due) = self.signals.time_line.next_due(t, h, &self.subsystems.instances) {
@@ -275,7 +275,7 @@ impl Testbed {
         Ok(outcome)
     }
 
-    /// Steps until `until_s`, an error, or the cancel flag; tells the observers. The observers' `finished` is
+    /// Steps until `until_s`, an error, or the cancel flag; notifies the observers. The observers' `finished` is
     /// left to the caller, who knows whether the run goes on.
     ///
     /// # Errors
@@ -302,7 +302,7 @@ impl Testbed {
     }
 
     /// Cost of the steps of each subsystem so far, s of wall time. Without glue: the steps that were watched, times the
-    /// steps that each stands for; with glue: all calls in a step.
+    /// steps that each represents; with glue: all calls in a step.
     pub fn costs(&self) -> impl Iterator<Item = (&str, f64)> {
         let cost = |slot| self.subsystems.cost(slot).as_secs_f64();
         self.instances().iter().enumerate().map(move |(slot, i)| (i.name(), cost(slot)))
@@ -393,7 +393,7 @@ impl Testbed {
         Ok(())
     }
 
-    /// Ends all subsystems. FMUs are told to terminate and are freed; what goes wrong there is an error too.
+    /// Ends all subsystems. FMUs are terminated and freed; a failure there is an error too.
     ///
     /// # Errors
     /// Error of a subsystem at its end.

@@ -191,7 +191,7 @@ fn a_fault_freezes_a_stream() {
     for variable in ["scanner.cloud", "mapper.cloud"] {
         let mut testbed = testbed("", &fault("\"freeze\"", variable)).unwrap();
         testbed.begin().unwrap();
-        // messages go on to arrive, and tell what the one of 0.3 s told
+        // messages go on to arrive, with the content of the one of 0.3 s
         let all = heard(&mut testbed, 8);
         let expected = [[0., 1.], [1., 2.], [2., 3.], [3., 4.], [3., 5.], [3., 6.], [6., 7.], [7., 8.]];
         assert_eq!(all, expected, "{variable}");
@@ -220,7 +220,7 @@ fn a_run_that_goes_on_from_a_snapshot_hears_the_same() {
             testbed.restore(&kept).unwrap();
             let times = told(&mut testbed);
             let count = if scanner.is_empty() { 6 } else { 2 };
-            // the message of before is not told once more
+            // the earlier message is not delivered once more
             assert!(times.len() == count && times[0] > 0.4 + 1e-9, "{kind} {scanner} {times:?}");
         }
     }

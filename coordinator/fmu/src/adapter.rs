@@ -1,4 +1,4 @@
-//! An FMU as a subsystem: trials by its saved states, values by name, every error with what the FMU said.
+//! An FMU as a subsystem: trials by its saved states, values by name, every error with the messages of the FMU.
 
 mod elements;
 mod opening;
@@ -22,7 +22,7 @@ use terraglue_subsystem::{
     Subsystem, ValueType, Values, ValuesMut, Variable,
 };
 
-/// An instance of an FMU as a subsystem. What every step looks at stands first and in this order, on two lines of the
+/// An instance of an FMU as a subsystem. Fields that every step reads come first and in this order, on two lines of the
 /// cache with the beginning of the instance.
 #[repr(C, align(64))]
 pub struct FmuSubsystem {
@@ -65,7 +65,7 @@ impl FmuSubsystem {
     /// `start_time_s`, `stop_time_s`, `log_categories`, `strict`, `trace`, `bodies`.
     ///
     /// # Errors
-    /// What is wrong with the FMU, or a start value that it does not take.
+    /// A defect of the FMU, or a start value that it does not take.
     pub fn new(path: &Path, parameters: &Map<String, Value>, host: Arc<dyn Host>) -> Result<Self> {
         let fmu = Fmu::open(path).map_err(error)?;
         let (options, start) = options(parameters)?;
@@ -120,7 +120,7 @@ impl FmuSubsystem {
         Ok(subsystem)
     }
 
-    /// What [`terraglue_host::Library::with_fmus`] takes.
+    /// Argument of [`terraglue_host::Library::with_fmus`].
     ///
     /// # Errors
     /// As [`FmuSubsystem::new`].
@@ -238,8 +238,8 @@ impl FmuSubsystem {
         )
     }
 
-    /// What is to be done before a step: the initialisation ends, a trial is taken back, a state is saved, wrenches are set.
-    /// Whether the step is to be made then.
+    /// Prepares a step: ends the initialisation, takes back a trial, saves a state, sets wrenches. Returns whether the step
+    /// is to be made then.
     #[inline(never)]
     fn prepare(&mut self, step: &Step, wrench: &[f64], out: &mut Response) -> Result<bool> {
         let begins = !self.running;

@@ -89,7 +89,7 @@ pub fn set(
     Ok(true)
 }
 
-/// What is no single input of a clock: none of this module's, or something that is not done.
+/// Answer for values that are not all single inputs of a clock: false, or an error for elements of an array of a clock.
 fn mixed(places: &[&ValueLocation]) -> Result<bool> {
     match places.iter().any(|p| p.clocked && p.count > 1) {
         true => {

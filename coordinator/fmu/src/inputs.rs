@@ -1,4 +1,4 @@
-//! What the columns of a table of inputs feed in an FMU that is run alone: numbers, arrays, texts and clocks, at communication
+//! Inputs of an FMU that is run alone, from the columns of a table: numbers, arrays, texts and clocks, at communication
 //! points and – numbers of FMUs that follow their inputs – within steps.
 
 use super::map::{element_name, find};
@@ -12,7 +12,7 @@ use terraglue_subsystem::{ValueType, Values};
 pub struct Inputs {
     table: Arc<Table>,
     all: Vec<Input>,
-    /// Inputs whose slopes are told (FMI 2), and their columns.
+    /// Inputs whose slopes are set (FMI 2), and their columns.
     slopes: Vec<u32>,
     columns: Vec<usize>,
 }
@@ -93,7 +93,7 @@ impl Inputs {
     /// Sets all inputs to what they are at t.
     ///
     /// # Errors
-    /// What is no value of its variable, or what the FMU does not take.
+    /// A cell that is no value of its variable, or a value that the FMU does not take.
     pub fn set(&self, instance: &mut FmuInstance, t: f64) -> Result {
         self.all.iter().try_for_each(|input| input.set(instance, &self.table, t))
     }
@@ -112,8 +112,8 @@ impl Inputs {
         }
     }
 
-    /// A part of a step begins, from t to `end`: what the FMU follows is set where the part is not the first, and slopes
-    /// are told.
+    /// Begins a part of a step, from t to `end`: sets slopes and, where the part is not the first, the inputs that the FMU
+    /// follows.
     pub fn begin_part(&self, instance: &mut FmuInstance, (t, end): (f64, f64), first: bool) -> Result {
         if !first {
             let mut followed = self.all.iter().filter(|i| i.followed);
@@ -131,7 +131,7 @@ impl Inputs {
     }
 }
 
-/// What to try where an FMU fails that follows its inputs.
+/// Advice where an FMU fails that follows its inputs.
 const WAY_OUT: &str = "it follows its inputs within steps; --hold-inputs holds them over each step instead";
 
 /// The variable that a column feeds, and the element of it.

@@ -28,7 +28,7 @@ pub use settings::{OnNan, start_values};
 
 use terraglue_host::Library;
 
-/// What the program brings with it: driven `feet`, and what makes subsystems of FMUs.
+/// Modules of this crate: driven `feet`, and the one that makes subsystems of FMUs.
 pub fn library() -> Library {
     Library::new().with::<DrivenBodiesModule>().with_fmus(FmuSubsystem::make)
 }

@@ -143,7 +143,7 @@ pub(super) fn stop_s(fmu: &Fmu) -> f64 {
 /// The files that let an exported FMU be checked, by their paths in the archive: the first steps of its default experiment.
 ///
 /// # Errors
-/// What the FMU does wrong.
+/// Errors of the FMU.
 pub(super) fn files(fmu: &Arc<Fmu>, inputs: &str, sink: Sink) -> Result<Vec<(String, String)>> {
     let input = match inputs.is_empty() {
         true => Table::default(),

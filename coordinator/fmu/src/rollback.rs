@@ -3,7 +3,7 @@
 use terraglue_fmi::{Advance, Error as FmiError, FmuInstance, FmuState};
 use terraglue_subsystem::{Error, Result};
 
-/// What two equal steps from one state may differ by, relative.
+/// Largest relative difference of two equal steps from one state.
 const SAME: f64 = 1e-12;
 
 /// Makes a step twice from the state `before`, each with the inputs that `push` sets, compares `outputs` (names and numbers

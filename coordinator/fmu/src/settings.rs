@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 use std::path::PathBuf;
 use terraglue_subsystem::{Error, Result};
 
-/// What a value that is no number does.
+/// Reaction to a value that is no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OnNan {
     /// It stops the run.
@@ -15,7 +15,7 @@ pub enum OnNan {
 
 /// Keys of the host in the table of an FMU.
 pub struct Options {
-    /// What a value that is no number does.
+    /// Reaction to a value that is no number.
     pub on_nan: OnNan,
     /// Whether events are handled in event mode.
     pub event_mode: bool,

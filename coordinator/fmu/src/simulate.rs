@@ -15,7 +15,7 @@ pub use super::table::{InputRow, Table};
 pub struct Settings {
     /// Start values by name, as text.
     pub start: Vec<(String, String)>,
-    /// s; none: what the FMU wants.
+    /// s; none: that of the FMU.
     pub start_time: Option<f64>,
     /// s.
     pub stop: Option<f64>,
@@ -80,7 +80,7 @@ pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
 /// Runs an FMU and writes its tables. Answers when the FMU itself asked for the end of the run before its time, s.
 ///
 /// # Errors
-/// What the FMU or its input does wrong, with the time.
+/// Errors of the FMU or its input, with the time.
 pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
     let row = &mut *tables.rows;
     let Plan { start, stop, step, steps, whole } = plan(fmu, settings)?;

@@ -29,7 +29,7 @@ impl Table {
     /// time counts, as in results with events.
     ///
     /// # Errors
-    /// What is wrong, with path and line.
+    /// A malformed table, with path and line.
     pub fn read(path: &Path, jumps: bool) -> Result<Self, String> {
         let file = terraglue_subsystem::files::open(path).map_err(|e| e.to_string());
         file.and_then(|file| Self::parse(file, jumps)).map_err(|e| format!("{}: {e}", path.display()))
@@ -38,7 +38,7 @@ impl Table {
     /// The same from any text.
     ///
     /// # Errors
-    /// What is wrong, with the line.
+    /// A malformed table, with the line.
     pub fn parse(text: impl Read, jumps: bool) -> Result<Self, String> {
         let mut reader = csv::Reader::from_reader(text);
         let header = reader.headers().map_err(|e| e.to_string())?.clone();

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_fmi::instance::Trace;
 
-/// What writes the calls of an instance to a file: the function, its values by reference, its status.
+/// A trace that writes the calls of an instance to a file: the function, its values by reference, its status.
 ///
 /// # Errors
 /// The file cannot be created.

@@ -3,7 +3,7 @@
 //! - `none`: x ← x + r; contracts where f does;
 //! - `aitken`: x ← x + ω·r with Aitken's dynamic ω (Irons and Tuck 1969; Küttler and Wall 2008, eq. 44);
 //! - `anderson`: the combination of the last six iterates that leaves the least residual (Anderson 1965), by a QR
-//!   factorisation that drops columns which say nothing new (Haelterman et al. 2016);
+//!   factorisation that drops linearly dependent columns (Haelterman et al. 2016);
 //! - `broyden`: Broyden's good rank-one update of the inverse Jacobian (Broyden 1965).
 
 use terraglue_scenario::Relaxation;
@@ -139,7 +139,7 @@ impl Acceleration {
         self.gamma.clone_from(&self.step);
     }
 
-    /// Modified Gram–Schmidt over the columns of ΔR, newest first; columns that say nothing new are dropped.
+    /// Modified Gram–Schmidt over the columns of ΔR, newest first; linearly dependent columns are dropped.
     fn orthogonalise(&mut self, n: usize) {
         self.q.clear();
         self.upper.clear();

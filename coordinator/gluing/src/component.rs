@@ -83,7 +83,7 @@ impl Component<'_> {
     }
 
     /// x1 − x2 with the distance of the points at t, of components that are not a soil's law; at h = 0 and at the
-    /// velocity level the derivative that the condition speaks of. The stretch of a compliant glue is added.
+    /// velocity level the derivative that the condition is on. The stretch of a compliant glue is added.
     pub fn mismatch(&self) -> f64 {
         let surface = if self.is_on_surface() && self.h > 0.0 { -self.second.x[self.i] } else { 0.0 };
         self.bodies_part() + surface + self.compliance() * self.t

@@ -63,7 +63,7 @@ impl Conditions {
         self.kinds.contains(&ConstraintKind::Joint)
     }
 
-    /// Whether the condition of a component speaks of rates or accelerations in a step of length h: a constraint at such a level.
+    /// Whether the condition of a component is on rates or accelerations in a step of length h: a constraint at such a level.
     /// Springs and contacts are laws of the place.
     pub(super) fn is_above_position(&self, i: usize, h: f64) -> bool {
         self.level != Level::Position

@@ -1,6 +1,6 @@
 //! The paper's single pass made exact for soils that yield: the soil iterates against the bodies' estimate.
 //!
-//! x1 = x_free + G1·T stands in for the bodies, so they are evaluated once, in step 4; the soil as often as it takes
+//! x1 = x_free + G1·T replaces the bodies, so they are evaluated once, in step 4; the soil as often as it takes
 //! (one to five times). Exact for bodies that are linear within the step, whatever the law or branch of the soil.
 //! Otherwise, as when a motor is at its limit under T* and not under T1, the estimate is taken again about T1. For one
 //! contact on a linear branch T = (f_n + κ·T*)/(1 + κ), κ = K·G1. The iteration is that of [`super::iterative`].

@@ -380,7 +380,7 @@ impl InterfaceProblem {
         }
         self.timings.charge(Part::CommitBodies, start);
         let start = Clock::now();
-        // a step of no length tells accelerations, which soils have none
+        // a step of no length gives accelerations, of which soils have none
         let before = work_at_ports(&self.grounds, instances);
         for side in self.grounds.iter_mut().filter(|_| self.at.h > 0.0) {
             let partner = (self.first.x.as_slice(), self.first.v.as_slice());

@@ -36,7 +36,7 @@ pub struct Monolithic {
     base: Vec<f64>,
     d: Vec<f64>,
     lu: Lu,
-    /// Whether soils are told the motion and answer with the wrench of their law; else they answer a force with a depth.
+    /// Whether soils take the motion and answer with the wrench of their law; else they answer a force with a depth.
     motion: bool,
 }
 

@@ -30,7 +30,7 @@ enum Way {
 ///
 /// One that comes from differences is taken at the first iteration of a step, and again when an iteration left more
 /// than 0.3 of the residual. Between, and with `broyden` from step to step, Broyden's rank-one update (1965) brings
-/// it up to what the trials say.
+/// it in line with the trials.
 #[derive(Debug, Default)]
 pub struct Refresh {
     way: Way,

@@ -25,14 +25,14 @@ pub struct StepReport {
     /// Whether the strategy reached its tolerance (a single pass always does).
     pub converged: bool,
     /// Whether what ran, in this step, was a single pass: it has no tolerance, and takes the motion of one side for that
-    /// of the other, so that neither convergence nor the gap of a contact says anything.
+    /// of the other, so that neither convergence nor the gap of a contact is meaningful.
     pub single_pass: bool,
     /// Whether joints were glued, whose gap is measured whatever the strategy.
     pub joints: bool,
     /// Whether the X-T form ran (else T-T, or a single pass).
     pub xt_form: bool,
-    /// Largest |x1 − x2| along n over the ports that were closed after the commit before, m: what the soil itself
-    /// says of its surface under the body, so it holds what the lattice makes of a sliding foot too.
+    /// Largest |x1 − x2| along n over the ports that were closed after the commit before, m, with the surface under the
+    /// body as the soil reports it, so it includes the effect of the lattice on a sliding foot.
     pub max_gap_m: f64,
     /// Largest difference of the wrench on the two sides along n, N.
     pub max_action_reaction_gap_n: f64,
@@ -47,8 +47,8 @@ pub struct StepReport {
     /// Largest |T* − T1| along n, N.
     pub estimate_gap_n: f64,
     /// |Work on side 1 + work on side 2| in the step, J, each by the wrench that acted there: on a body the wrench that it
-    /// was told, on a soil that of its own law at the motion committed. What springs of the glue stored and what dampers and
-    /// friction between bodies turned into heat is taken off. Not a number where a soil keeps no energy ledger.
+    /// received, on a soil that of its own law at the motion committed. Energy stored by springs of the glue, and heat of its
+    /// dampers and of friction between bodies, is subtracted. NaN where a soil keeps no energy ledger.
     pub interface_work_error_j: f64,
     /// Σ |T·x1| over the ports in the step, J: how much work went through them.
     pub port_work_path_j: f64,
@@ -65,7 +65,7 @@ pub struct StepReport {
 }
 
 impl StepReport {
-    /// Whether [`StepReport::max_gap_m`] says how far the sides lie apart.
+    /// Whether [`StepReport::max_gap_m`] is the distance of the sides.
     pub fn has_gap(&self) -> bool {
         self.joints || !self.single_pass
     }

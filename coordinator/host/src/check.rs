@@ -1,4 +1,4 @@
-//! Finds what a subsystem left NaN or infinite, and says where.
+//! Finds values that a subsystem left NaN or infinite, with their places.
 
 use terraglue_subsystem::Step;
 

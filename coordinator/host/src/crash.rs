@@ -1,4 +1,4 @@
-//! A crash inside a module that is not isolated: standard error tells which one was called before the process ends as it would have.
+//! A crash inside a module that is not isolated: standard error names the module before the process ends as it would have.
 //!
 //! Every call is noted with four words of the thread; the handler reads them and calls nothing but `write`.
 #![allow(unsafe_code)] // Signal handlers, and what they may read.
@@ -94,7 +94,7 @@ pub(super) fn forget(names: &Names) {
 static mut BEFORE: [Option<libc::sigaction>; CRASHES.len()] = [None; CRASHES.len()];
 static LISTENING: Once = Once::new();
 
-/// From here on a crash is told. Who handled it before does so afterwards: an overflow of the stack is told by the runtime.
+/// Reports crashes from here on. Earlier handlers run afterwards: the runtime reports an overflow of the stack.
 pub fn tell() {
     LISTENING.call_once(|| {
         for (k, (signal, _)) in CRASHES.iter().enumerate() {
@@ -177,7 +177,7 @@ fn report(index: usize, names: &Names, call: &LastCall) {
 }
 
 fn put(text: &str) {
-    // SAFETY: a plain system call on bytes that are there. What cannot be written is lost.
+    // SAFETY: a plain system call on bytes that are there. Bytes that cannot be written are lost.
     let _ = unsafe { libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len()) };
 }
 

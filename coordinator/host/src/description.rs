@@ -15,15 +15,15 @@ pub struct Description {
     pub version: String,
     /// MAJOR.MINOR of the ABI that it was built for.
     pub abi: String,
-    /// Soil, robot, controller, law or sensor; empty: not told.
+    /// Soil, robot, controller, law or sensor; empty: not given.
     pub kind: String,
     /// Capabilities of an instance, in the words of [`terraglue_plugin::describe::WORDS`]; None: not given.
     pub can: Option<Vec<String>>,
-    /// Its variables, `NAME ROLE TYPE UNIT`: a `*` in a name stands for any text, ` | ` parts units.
+    /// Its variables, `NAME ROLE TYPE UNIT`: a `*` in a name matches any text, ` | ` separates units.
     pub variables: Vec<String>,
-    /// Licence; empty: not told.
+    /// Licence; empty: not given.
     pub license: String,
-    /// Authors, separated by `:`; empty: not told.
+    /// Authors, separated by `:`; empty: not given.
     pub authors: String,
 }
 
@@ -104,7 +104,7 @@ impl Description {
     }
 }
 
-/// Whether a line of a description speaks of a variable.
+/// Whether a line of a description covers a variable.
 fn covers(said: &str, line: &str) -> bool {
     let parts = |line: &str| {
         let mut parts = line.splitn(4, ' ').map(str::to_owned);
@@ -117,7 +117,7 @@ fn covers(said: &str, line: &str) -> bool {
         && unit.split(" | ").any(|unit| unit == own[3])
 }
 
-/// Whether a text is as the pattern, in which `*` stands for any text, none included.
+/// Whether a text matches the pattern, in which `*` matches any text, the empty one included.
 fn matches(pattern: &str, text: &str) -> bool {
     let Some((head, rest)) = pattern.split_once('*') else { return pattern == text };
     let Some(text) = text.strip_prefix(head) else { return false };

@@ -1,5 +1,5 @@
-//! Why a module cannot be used; each cause with its own message and a number, under which `docs/plugins/errors.md` tells the
-//! cure at length.
+//! Reasons why a module cannot be used; each with its own message and a number, under which `docs/plugins/errors.md` describes
+//! the cure at length.
 
 use std::path::PathBuf;
 use terraglue_plugin::TableError;

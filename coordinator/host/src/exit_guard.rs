@@ -59,7 +59,7 @@ pub fn arm() -> Armed {
     Armed(())
 }
 
-/// Leaves `work` to be done when foreign code ends the process. It tells the error; it must not wait for anything that a
+/// Leaves `work` to be done when foreign code ends the process. It reports the error; it must not wait for anything that a
 /// thread may hold.
 #[must_use]
 pub fn add_exit_hook(work: impl FnOnce() + Send + 'static) -> ExitHook {

@@ -31,7 +31,7 @@ pub enum Reply {
     Refused(String),
 }
 
-/// A subsystem of a run. What no step asks for lies apart: the cost of many cheap subsystems is that of their memory.
+/// A subsystem of a run. Fields that no step reads lie apart: the cost of many cheap subsystems is that of their memory.
 pub struct Instance {
     subsystem: Box<dyn Subsystem>,
     supervision: Supervision,
@@ -70,7 +70,7 @@ impl CallWatch {
     }
 }
 
-/// What derivatives are taken by.
+/// Quantity with respect to which derivatives are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
     /// A variable.

@@ -398,7 +398,7 @@ pub struct AvailableModule {
     pub schema: std::result::Result<Schema, LoadError>,
 }
 
-/// A file of a module, as far as it can be told without running it.
+/// A file of a module, as far as it can be described without running it.
 #[derive(Debug)]
 pub struct ListedModule {
     /// Name by its file.

@@ -1,6 +1,6 @@
 //! State of the process on which the program itself relies, and that it resets if foreign code has changed it: the
 //! working folder, the mask for new files, the locale, the signals that end a run.
-#![allow(unsafe_code)] // The C library is asked and told.
+#![allow(unsafe_code)] // State of the C library is read and set.
 
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
@@ -95,7 +95,7 @@ fn no_handler() -> libc::sigaction {
     unsafe { std::mem::zeroed() }
 }
 
-/// The mask for new files. Linux tells it; elsewhere it can only be read by setting it, which other threads would see.
+/// The mask for new files. Linux reports it; elsewhere it can only be read by setting it, which other threads would see.
 fn mask() -> libc::mode_t {
     static READING: Mutex<()> = Mutex::new(());
     told_mask().unwrap_or_else(|| {
@@ -109,7 +109,7 @@ fn mask() -> libc::mode_t {
     })
 }
 
-/// The mask as `/proc` tells it.
+/// The mask in `/proc`.
 fn told_mask() -> Option<libc::mode_t> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"))?;

@@ -1,4 +1,4 @@
-// What plots and map share: packed numbers, SVG elements, ticks, numbers as text.
+// Functions that plots and map share: packed numbers, SVG elements, ticks, numbers as text.
 
 /** Numbers from base64 of little-endian f32. */
 export function unpack(text) {

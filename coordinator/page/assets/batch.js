@@ -24,7 +24,7 @@ export class Batch {
   get used() { return this.numbers.subarray(0, this.length); }
 }
 
-/** What is drawn in one picture. */
+/** All shapes of one picture. */
 export class Drawing {
   constructor() {
     this.shapes = { box: new Batch(), sphere: new Batch(), cylinder: new Batch() };

@@ -6,7 +6,7 @@ import { readerOf } from "terraglue/link.js";
 /** How often the ghost is brought to the time of the view, ms. */
 const FOLLOW_MS = 50;
 
-/** What the server offers beside the run; tells `beside` once it is known. */
+/** The recording that the server offers beside the run; sends `beside` once it is known. */
 export class Beside {
   constructor(run) {
     Object.assign(this, { run, name: "", channels: new Map(), asked: NaN, busy: false });

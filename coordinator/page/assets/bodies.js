@@ -1,4 +1,4 @@
-// Bodies and other things that messages of the type foxglove.SceneUpdate tell: their shapes become places of solids in a drawing.
+// Bodies and other things in messages of the type foxglove.SceneUpdate: their shapes become places of solids in a drawing.
 import { add, inFrame, length, minus3, placed, times, turn, upTo, product } from "terraglue/math.js";
 
 const WORLD = { p: [0, 0, 0], q: [1, 0, 0, 0] };

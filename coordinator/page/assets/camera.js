@@ -5,7 +5,7 @@ const ANGLE = 0.66;
 /** Directions of the cameras by name: turn about z, and above the horizon, rad. */
 const PLACES = { follow: [-0.95, 0.42], side: [-Math.PI / 2, 0.12], top: [-Math.PI / 2, 1.55], front: [0, 0.2], orbit: null };
 
-/** What one picture sees. */
+/** The view of one picture. */
 export class Sight {
   constructor(eye, target, aspect, pixels, reach) {
     this.eye = eye;
@@ -97,7 +97,7 @@ export class Camera {
   }
 }
 
-/** Binds mouse, touch and wheel of an element; `changed` is told, `click(event)` where nothing was dragged, `grab(event)` may take a drag. */
+/** Binds mouse, touch and wheel of an element; `changed` is called, `click(event)` where nothing was dragged, `grab(event)` may take a drag. */
 export function bindCamera(element, camera, { changed, click, grab }) {
   const fingers = new Map();
   let [from, taken, spread] = [null, null, 0];

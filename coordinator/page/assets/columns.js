@@ -1,4 +1,4 @@
-// Variables in the messages of a subsystem: the metadata of the channel say which field is which variable.
+// Variables in the messages of a subsystem: the metadata of the channel map fields to variables.
 
 /** Gives `[name, value]` of every variable in a message. `about` is the JSON of the metadata, `fields` those of the decoder. */
 export function columnReader(about, fields, subsystem) {

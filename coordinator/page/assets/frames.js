@@ -1,4 +1,4 @@
-// What `/at` and `/messages` give: messages of several channels one after another, each with its channel and time.
+// Answers of `/at` and `/messages`: messages of several channels one after another, each with its channel and time.
 
 /** Calls `take(channel id, t_s, bytes)` for each. */
 export function eachFrame(buffer, take) {

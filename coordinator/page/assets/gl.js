@@ -1,4 +1,4 @@
-// Short ways to what WebGL 2 says in many words.
+// Short functions for common operations of WebGL 2.
 
 function shader(gl, kind, source) {
   const made = gl.createShader(kind);

@@ -1,4 +1,4 @@
-// Keys of the page, and the overlay that tells them.
+// Keys of the page, and the overlay that lists them.
 import { htmlElement } from "terraglue/axes.js";
 
 const KEYS = [

@@ -9,7 +9,7 @@ const AGAIN_MS = [300, 600, 1200, 2500];
 const textOf = new TextDecoder();
 const bytesOf = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
 
-/** What reads the messages of a channel: Protobuf by its descriptors, JSON, or bytes as they are. */
+/** The reader of the messages of a channel: Protobuf by its descriptors, JSON, or bytes as they are. */
 export function readerOf(channel) {
   if (channel.encoding === "json") return (bytes) => JSON.parse(textOf.decode(bytes));
   if (channel.encoding !== "protobuf") return (bytes) => bytes;
@@ -24,8 +24,8 @@ export class Link extends EventTarget {
     Object.assign(this, { address, channels: new Map(), byTopic: new Map(), wanted: new Map(), services: new Map() });
     Object.assign(this, { calls: new Map(), writes: new Map(), numbers: 0, attempts: 0, silent: 0, watched: [], open: false, info: null });
     this.connect();
-    // a server that says nothing any more is as good as gone: its state comes five times a second. Seconds in which the page itself
-    // was too busy to listen are one tick, whatever they last.
+    // a server that is silent is as good as gone: it sends its state five times a second. However long the page itself is too busy
+    // to listen, that is one tick.
     setInterval(() => { if (this.open && this.silent++ >= SILENT_TICKS) this.socket.close(); }, 1000);
   }
 

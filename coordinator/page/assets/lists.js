@@ -33,7 +33,7 @@ export class Events {
   }
 }
 
-/** What the operator changed; each can be undone, and all be saved as a scenario. */
+/** Changes of the operator; each can be undone, and all be saved as a scenario. */
 export class Changes {
   constructor(parent, run) {
     this.run = run;

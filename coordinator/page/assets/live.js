@@ -30,7 +30,7 @@ function shot(run, stage) {
   });
 }
 
-// What the page says for a moment, and what it says as long as the connection is lost.
+// Messages that the page shows for a moment, and the banner while the connection is lost.
 function messages(run) {
   const banner = at("banner");
   run.on("link", (on) => {
@@ -45,13 +45,13 @@ function messages(run) {
   });
 }
 
-// What the scenario wants the page to look like; the address counts more.
+// The layout that the scenario asks for; the address takes precedence.
 function layout(run) {
   const text = run.link.info?.metadata?.page;
   return text ? JSON.parse(text) : {};
 }
 
-// What stands in the address is restored once the variables are known, else what the scenario says; an empty one gets something to look at.
+// Once the variables are known, selection and plots are restored from the address, else from the scenario, else from a default.
 function restore(run, scope) {
   const done = { yes: false };
   run.on("variables", () => {

@@ -28,7 +28,7 @@ export class GroundMap {
 
   whole() { return { x: [...this.map.x], y: [...this.map.y] }; }
 
-  // What the feet and the body touched, with some air.
+  // The extent of path, marks and tracks, with a margin.
   track() {
     const touched = [...(this.path ? [this.path] : []), ...this.marks, ...this.tracks];
     const [xs, ys] = [touched.flatMap((l) => [...l.x]), touched.flatMap((l) => [...l.y])];

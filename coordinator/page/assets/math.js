@@ -68,7 +68,7 @@ export function matrixProduct(a, b) {
   return out;
 }
 
-/** What stands at `eye` and looks at `target`. */
+/** View matrix of a camera at `eye` that looks at `target`. */
 export function lookAt(eye, target, up) {
   const back = unit(minus3(eye, target));
   const right = unit(cross(up, back));
@@ -108,5 +108,5 @@ export function hull(points) {
   return [...half(sorted), ...half(sorted.reverse())];
 }
 
-/** Whether a place stands over a convex polygon. */
+/** Whether a place is above a convex polygon. */
 export const inside = (corners, p) => corners.every((a, k) => left(a, corners[(k + 1) % corners.length], p) >= 0);

@@ -8,7 +8,7 @@ export const COLOURS = ["plain", "height", "sinkage", "slope"];
 const UNITS = ["", "m", "mm", "°"];
 const FACTORS = [1, 1, 1e3, 180 / Math.PI];
 
-/** What can be shown beside bodies and ground: name, text, scale offered, on at first. */
+/** Layers that can be shown beside bodies and ground: name, text, scale offered, on at first. */
 export const LAYERS = [
   ["forces", "contact forces", true, true], ["torques", "motor torques", true, false], ["centre", "centre of mass of the body", false, false],
   ["support", "support polygon", false, false],

@@ -18,7 +18,7 @@ export function nodeAt(nodes, x, y) {
 /** Value of a packed field at a node. */
 export const valueAt = (field, node) => field.low + field.step * field.numbers[node];
 
-/** What the reader is told of a place; height and sinkage where they are known and the place is on the ground. */
+/** Text about a place; with height and sinkage where they are known and the place is on the ground. */
 export function groundText(nodes, x, y) {
   const signed = (value, digits) => {
     const text = value.toFixed(digits);

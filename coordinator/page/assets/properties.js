@@ -3,7 +3,7 @@ import { htmlElement, short } from "terraglue/axes.js";
 
 const EFFECTS = { live: "takes effect at the next step", "needs reset": "takes effect when the run starts again", "read only": "cannot be written" };
 
-// Text of an edit as the value that the variable's kind wants; undefined where it is none.
+// Text of an edit as a value of the variable's kind; undefined where it is none.
 function parsed(variable, text) {
   if (variable.kind === "string" || variable.kind === "enum") return text;
   const value = Number(text.trim().replace("−", "-").replace(",", "."));
@@ -68,7 +68,7 @@ export class Properties {
     for (const action of this.run.actions.filter((a) => below(a.id))) this.action(action, group);
     this.weaken(`${group}.max_torque`);
     if (!own.length) htmlElement(this.list, "p", "hint", "It has parts, and no variables of its own.");
-    // what can be changed stands first
+    // variables that can be changed come first
     const order = ["live", "needs reset", "read only"];
     own.sort((a, b) => order.indexOf(this.run.variables.get(a).effect) - order.indexOf(this.run.variables.get(b).effect));
     for (const id of own) this.rows.set(id, new Row(this.list, this.run, this.run.variables.get(id), group));

@@ -111,7 +111,7 @@ function collect(types, prefix, messages) {
   }
 }
 
-// A type by its name as a field tells it: whole with a dot before it, else as seen from inside the type that has the field.
+// A type by its name as a field gives it: absolute with a leading dot, else relative to the type that has the field.
 function resolved(types, name, from) {
   if (name.startsWith(".")) return types.get(name);
   for (let scope = from; ; scope = scope.slice(0, scope.lastIndexOf("."))) {

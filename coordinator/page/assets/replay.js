@@ -1,11 +1,11 @@
-// The replay above a report: the view, a bar to play and scrub, and the address that says where it stands (#t=4.2&camera=side).
+// The replay above a report: the view, a bar to play and scrub, and the address with its state (#t=4.2&camera=side).
 import { htmlElement } from "terraglue/axes.js";
 import { newtonsOf, takeScene } from "terraglue/bodies.js";
 import { decoder } from "terraglue/protobuf.js";
 import { GroundTrack, Track, inflate } from "terraglue/track.js";
 import { View } from "terraglue/view.js";
 
-/** What an address asks for after its #: `t`, `camera`, `ground`, `alone`. */
+/** The settings in an address after its #: `t`, `camera`, `ground`, `alone`. */
 export const wishes = () => new URLSearchParams(location.hash.slice(1));
 
 class Replay {
@@ -96,7 +96,7 @@ class Replay {
     });
   }
 
-  // What the address asks for.
+  // Applies the settings in the address.
   obey() {
     const wish = wishes();
     const [camera, ground] = ["camera", "ground"].map((key) => wish.get(key) ?? this.page?.[key]);

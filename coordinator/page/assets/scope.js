@@ -96,7 +96,7 @@ export class Scope {
 
   names() { return [...new Set(this.plots.flatMap((p) => [...p.ids, ...(p.across ? [p.across] : [])]))]; }
 
-  /** As text for an address, and back: plots by `;`, variables by `,`, what stands along the axis after `@`. */
+  /** As text for an address, and back: plots by `;`, variables by `,`, the quantity along the axis after `@`. */
   get text() { return this.plots.map((p) => p.ids.join(",") + (p.across ? `@${p.across}` : "")).join(";"); }
   set text(text) {
     for (const plot of text.split(";").filter(Boolean)) {
@@ -214,7 +214,7 @@ export class Scope {
     return plot;
   }
 
-  // Without the quantity that stands beside the axis, where all share it.
+  // Without the quantity, where all share it: it is written next to the axis.
   shortName(id, entry) {
     const same = entry.ids.every((other) => other.endsWith(`.${entry.quantity}`));
     return same ? id.slice(0, -entry.quantity.length - 1) : id;

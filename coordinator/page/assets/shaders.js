@@ -66,7 +66,7 @@ void main() { gl_Position = viewProjection * vec4(place(), 1.0); }`,
   `${HEAD}void main() {}`,
 ];
 
-// The ground: a grid of corners that stand as high as the texture says. COARSE takes slopes and colours at the corners only.
+// The ground: a grid of corners at the heights of the texture. COARSE takes slopes and colours at the corners only.
 const GROUND_PARTS = [
   `layout(location = 0) in vec3 corner; layout(location = 1) in vec2 tile;
 uniform mat4 viewProjection; uniform sampler2D heights; uniform ivec2 size; uniform vec3 lattice; uniform float drop;

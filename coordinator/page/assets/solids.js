@@ -2,7 +2,7 @@
 
 const TURN = 2 * Math.PI;
 
-// Corners of a face that is told by its rim, with one direction for all.
+// Corners of a face that is given by its rim, with one direction for all.
 function fan(out, rim, normal) {
   for (let k = 1; k + 1 < rim.length; k++) for (const p of [rim[0], rim[k], rim[k + 1]]) out.push(...p, ...normal);
 }

@@ -89,7 +89,7 @@ export class Stage {
     this.run.tell("staged");
   }
 
-  // Centre of mass of the selected body, else of the one that is followed; its variables tell it in the frame of the body.
+  // Centre of mass of the selected body, else of the one that is followed; its variables give it in the frame of the body.
   centreIds() {
     const frame = this.view.selected ?? this.view.body ?? "";
     return ["x", "y", "z"].map((c) => `${frame.replace("/", ".")}.force_at_${c}`);
@@ -124,7 +124,7 @@ export class Stage {
     takeScene(this.view.overlays.get(topic), message);
   }
 
-  // The tree of the joints stands in the metadata of their topic.
+  // The tree of the joints is in the metadata of their topic.
   tree(topic) {
     const text = this.run.metadata[topic]?.joints;
     if (!text) return null;
@@ -147,7 +147,7 @@ export class Stage {
     this.view.torques = torques;
   }
 
-  // Points of a cloud in the world; those that hit the own body have another colour where the sensor says so.
+  // Points of a cloud in the world; those that hit the own body have another colour where the sensor marks them.
   takeCloud(topic, { frame_id: frame, pose, point_stride: stride, fields, data }) {
     const [view, place] = [new DataView(data.buffer, data.byteOffset, data.byteLength), this.placeOf(frame, pose)];
     if (!place || !stride) return;

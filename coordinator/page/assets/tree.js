@@ -136,7 +136,7 @@ export class Tree {
     if (first.length && !first.some((i) => i.tabIndex === 0)) first[0].tabIndex = 0;
   }
 
-  // What was changed has a dot, and so has all above it.
+  // Changed items have a dot, and so have all items above them.
   dot() {
     const changed = this.run.changed.map((c) => c.id);
     for (const item of this.items()) {

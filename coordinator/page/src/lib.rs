@@ -19,11 +19,11 @@ const STYLE: &str = "text/css; charset=utf-8";
 /// A file of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asset {
-    /// Where it stands below the address of the page.
+    /// Its path below the address of the page.
     pub path: &'static str,
-    /// What it is, as HTTP says it.
+    /// Media type, as in the HTTP header.
     pub media_type: &'static str,
-    /// What is in it.
+    /// Its content.
     pub bytes: &'static [u8],
 }
 
@@ -123,7 +123,7 @@ pub fn import_map(modules: &[&str]) -> String {
     format!("{{\"imports\":{{{}}}}}", entries.join(","))
 }
 
-/// As it may stand in an address, in JSON and inside an element of a page.
+/// Escaped for use in an address, in JSON and inside an element of a page.
 fn quoted(text: &str) -> String {
     let mut out = String::with_capacity(text.len() * 5 / 4);
     for byte in text.bytes() {

@@ -25,7 +25,7 @@ pub(crate) struct BodyTrack {
     up: Option<[f64; 3]>,
     now_at: [f64; 3],
     peak_n: f64,
-    /// Whether the world holds its subsystem: the ground does not bear its weight alone.
+    /// Whether its subsystem is fixed to the world: the ground does not carry its weight alone.
     held: bool,
     /// Length of the way of its origin, m.
     pub path_m: f64,
@@ -124,7 +124,7 @@ impl BodyTrack {
         Some((0..3).map(|k| (self.now_at[k] - self.start[k]) * up[k]).sum())
     }
 
-    /// All that the ground bears of the robot in this step.
+    /// Tracks the peak of the total normal force of the ground on the robot.
     fn follow_force(&mut self, view: &View) {
         let own = |p: &&PortReport| p.subsystem as usize == self.subsystem && p.wrench[0] > 0.0;
         // a joint to another subsystem is no ground
@@ -154,7 +154,7 @@ impl BodyTrack {
     }
 }
 
-/// Whether a robot tells the poses of its bodies and none of them can be chosen: its root is fixed to the world.
+/// Whether a robot reports the poses of its bodies and none of them can be chosen: its root is fixed to the world.
 fn is_held(robot: &SubsystemView) -> bool {
     let variables = robot.instance.variables();
     let of = |body: &str, part: &str| {

@@ -233,7 +233,7 @@ impl ChunkFile {
         self.topics.values()
     }
 
-    /// What was simulated; see [`crate::Header`].
+    /// Description of the simulation; see [`crate::Header`].
     pub fn header(&self) -> &BTreeMap<String, String> {
         &self.header
     }

@@ -1,7 +1,7 @@
 //! Named numbers as a Protobuf message: `LF_j2.angle` is the field `angle` of the field `LF_j2`.
 //!
 //! The message type is made of the names when a run starts, so every reader of Protobuf plots the variables without
-//! knowing this program. What Protobuf cannot say, the exact name, the unit and the help of each column, is JSON in
+//! knowing this program. Exact name, unit and help of each column, for which Protobuf has no place, are JSON in
 //! the channel's metadata under `columns`.
 
 use crate::descriptor;
@@ -12,7 +12,7 @@ use prost_types::FieldDescriptorProto;
 use prost_types::field_descriptor_proto::Type;
 use serde::{Deserialize, Serialize};
 
-/// What is known of a column.
+/// Description of a column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct About {
     /// Name in its subsystem.
@@ -100,7 +100,7 @@ struct Field {
     number: u32,
     name: String,
     what: What,
-    /// What stands before it in a message.
+    /// Key before it in a message.
     key: Key,
     /// Length of its body with every number there.
     guess: usize,
@@ -197,7 +197,7 @@ impl Columns {
         (all, about)
     }
 
-    /// The type that a recording tells of.
+    /// The type that a recording describes.
     pub fn read(about: &[About]) -> Self {
         let mut all = Self::default();
         let mut last: &[u32] = &[];
@@ -271,7 +271,7 @@ fn insert(fields: &mut Vec<Field>, name: &str, what: &What) -> Vec<u32> {
     numbers
 }
 
-/// Puts values at the numbers that a recording tells.
+/// Puts values at the field numbers of a recording.
 fn place(fields: &mut Vec<Field>, numbers: &[u32], what: &What) {
     let Some((number, rest)) = numbers.split_first() else { return };
     let new = || if rest.is_empty() { what.clone() } else { What::Group(Vec::new()) };

@@ -96,7 +96,7 @@ pub struct TimingRow {
 }
 terraglue_subsystem::persist!(TimingRow { section, wall_s, cpu_s, steps });
 
-/// Writes `timing.csv`. Nothing that a clock measured stands in any other file but `summary.json`.
+/// Writes `timing.csv`. Measured times are in no other file but `summary.json`.
 ///
 /// # Errors
 /// [`Error::File`](terraglue_diagnostics::Error::File): the file cannot be written.

@@ -31,9 +31,9 @@ pub struct Energies {
     pub soil_heat_j: Option<f64>,
     /// Heat of everything else, J: joints, contacts between bodies, dampers of the glue.
     pub other_heat_j: Option<f64>,
-    /// What is not accounted for, J: changes and heat − work; > 0 came from nowhere.
+    /// Energy that is not accounted for, J: changes and heat − work; > 0 came from nowhere.
     pub drift_j: Option<f64>,
-    /// What the drift is held against, J: the largest of ∫|power|dt of motors and loads, ∫|power|dt through the ports, and the
+    /// Reference of the drift, J: the largest of ∫|power|dt of motors and loads, ∫|power|dt through the ports, and the
     /// changes of kinetic and potential energy. A robot that stands does next to no work with its motors.
     pub turnover_j: f64,
     /// Whether that is the work through the ports.
@@ -56,7 +56,7 @@ impl Energies {
         self.drift_j.is_some_and(|d| d.abs() > (TOLERATED * self.turnover_j).max(ROUNDING_J))
     }
 
-    /// What the drift is held against, for people.
+    /// Reference of the drift, in words.
     pub fn measure(&self) -> &'static str {
         match (self.by_ports, self.by_changes) {
             (true, _) => "of the work at the ports",

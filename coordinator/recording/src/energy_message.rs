@@ -1,5 +1,5 @@
 //! The columns of `/energy`: kinetic, potential, dissipated energy and works, J, of all and of each subsystem that can
-//! have any. What is unknown is NaN.
+//! have any. Unknown values are NaN.
 
 use crate::columns::{About, Columns};
 use crate::snapshot::{Column, ScalarKind};

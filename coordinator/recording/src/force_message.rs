@@ -9,7 +9,7 @@ use terraglue_engine::observer::View;
 use terraglue_gluing::PortReport;
 use terraglue_subsystem::{Kind, Pose as OwnPose};
 
-/// Forces are drawn this often; the numbers stand in `/gluing` and `/<subsystem>` at every record, s.
+/// Forces are drawn this often; the numbers are in `/gluing` and `/<subsystem>` at every record, s.
 pub(crate) const DRAWN_EVERY_S: f64 = 0.02;
 /// Length of an arrow as heavy as all robots, m.
 const WEIGHT_LENGTH_M: f64 = 0.5;
@@ -49,7 +49,7 @@ impl Forces {
     pub fn arrows(&self, view: &View) -> SceneUpdate {
         let [r, g, b] = COLOUR.map(|c| f64::from(c) / 255.0);
         let arrow = |(tail, force, length): ([f64; 3], [f64; 3], f64)| {
-            // What is drawn needs no more than single precision, and fewer digits take less room.
+            // Drawings need no more than single precision, and fewer digits take less room.
             let coarse = |x: f64| f64::from(x as f32);
             ArrowPrimitive {
                 pose: Some(Pose {

@@ -1,6 +1,6 @@
 //! The messages of `/gluing`: how the recorded step was glued, its ports, and the extremes since the message before.
 //!
-//! What is unknown, or does not apply to a single pass, is NaN.
+//! Values that are unknown, or do not apply to a single pass, are NaN.
 
 use crate::descriptor::{field, file, message, nested, repeated};
 use crate::messages::{GluingRecord, Point, PortRecord, WindowRecord};

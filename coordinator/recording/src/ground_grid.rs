@@ -27,7 +27,7 @@ impl Rectangle {
     }
 }
 
-// Another process counts generations afresh; `unseen` says what is left of them.
+// Another process counts generations afresh; `unseen` marks the tiles with changes that were not recorded.
 keep!(GroundGrid { initial } parts {} same { subsystem, info, height, sinkage, generations });
 
 /// The fields `height` and `sinkage` of a soil. Where a soil shows no `sinkage`, it is the initial height minus

@@ -129,7 +129,7 @@ impl GroundPoints {
             let bits = u64::from(u32::from_le_bytes(z)) << 32 | u64::from(u32::from_le_bytes(sinkage));
             sum = (sum.rotate_left(23) ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         }
-        // 0 stands for what was never drawn
+        // 0 marks a tile that was never drawn
         sum.max(1)
     }
 }

@@ -1,4 +1,4 @@
-//! Fingerprints of what a scenario refers to, so that two recordings can be told apart by more than the scenario's text.
+//! Fingerprints of the files that a scenario refers to: they distinguish recordings of the same text.
 
 use serde_json::Value;
 use std::path::Path;
@@ -6,7 +6,7 @@ use terraglue_diagnostics::fingerprint;
 use terraglue_scenario::{Scenario, TerrainKind};
 
 /// One line `key fingerprint` for each file that the scenario names (robots, laws, elevation) and for the numbers that
-/// each subsystem takes from the soil table. What a file refers to itself, e.g. a robot to meshes, is not among them.
+/// each subsystem takes from the soil table. Files that these refer to, such as the meshes of a robot, are not included.
 pub fn fingerprints(scenario: &Scenario) -> String {
     let mut lines = Vec::new();
     for spec in &scenario.subsystems {

@@ -1,4 +1,4 @@
-//! What a recorder knows of the steps before, so that a run that goes on in another process goes on as if nothing had
+//! State of a recorder from earlier steps, so that a run can continue in another process as if nothing had
 //! happened: every field is either kept or named as one that the scenario and the modules give again.
 
 /// A value that is made anew from scenario and modules, and then gets what earlier steps have left in it.

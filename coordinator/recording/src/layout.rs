@@ -12,7 +12,7 @@ pub const RECORDING: &str = "recording.mcap";
 pub const SUMMARY: &str = "summary.json";
 /// All scalar variables as a table.
 pub const VARIABLES: &str = "variables.csv";
-/// What a clock measured.
+/// Measured wall times.
 pub const TIMING: &str = "timing.csv";
 /// How values went round.
 pub const EXCHANGE: &str = "exchange.json";
@@ -23,7 +23,7 @@ pub const VIEWER_LAYOUT: &str = "viewer_layout.json";
 /// The report page.
 pub const REPORT: &str = "report.html";
 
-/// What a run that was ended from outside goes on from.
+/// State from which a run resumes that was ended from outside.
 pub const CHECKPOINT: &str = "checkpoint.bin";
 
 /// Removes the files of an earlier run, so that none of them stays beside the new ones. Touches nothing in a

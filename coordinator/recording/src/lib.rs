@@ -13,7 +13,7 @@
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
 //! | `checkpoint.bin` | on request, while a run goes on: what `terraglue_checkpoint::Checkpoint` goes on from |
 //!
-//! Topics, message types and what each viewer makes of them stand in `docs/recording.md`.
+//! `docs/recording.md` describes the topics, the message types and how each viewer shows them.
 //!
 //! A metadata record `terraglue` at the head holds the scenario's text after all edits, fingerprints of the files that it
 //! names, strategy and modules.

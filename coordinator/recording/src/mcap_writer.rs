@@ -1,7 +1,7 @@
 //! `recording.mcap`: all topics of a run in one append-only file.
 //!
 //! Equal runs give equal bytes: times are simulated, chunks end by a count of steps, one thread compresses them in their
-//! order, and no name of a machine or folder is written. What was flushed survives `kill -9`.
+//! order, and no name of a machine or folder is written. Flushed messages survive `kill -9`.
 
 use crate::columns::{About, Columns};
 use crate::force_message::{DRAWN_EVERY_S, Forces};
@@ -64,7 +64,7 @@ struct Variables {
     /// Which of them are no real numbers.
     whole: Vec<bool>,
     values: Vec<f64>,
-    /// What was written last, of columns that are written when they change.
+    /// Last written values of columns that are written when they change.
     written: Option<Vec<f64>>,
 }
 
@@ -131,7 +131,7 @@ pub(crate) struct McapWriter {
 }
 
 impl McapWriter {
-    /// Creates the file; `about` is the description of the run that stands at its head.
+    /// Creates the file; `about` is the description of the run at its head.
     pub fn create(folder: &Path, about: BTreeMap<String, String>, scenario: &Scenario) -> Result<Self> {
         let path = folder.join(RECORDING);
         let file = KeptFile::create(&path).map_err(at(&path))?;
@@ -234,7 +234,7 @@ impl McapWriter {
         Ok(())
     }
 
-    /// What of the view is recorded in forms of its own.
+    /// Finds the parts of the view that are recorded in forms of their own: ground, forces, visibility.
     fn find(&mut self, view: &View) -> Result {
         self.ground = GroundGrid::find(view)?;
         self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));

@@ -1,4 +1,4 @@
-//! What `/gluing` says of a step, as the report and programs read it; [`super::gluing_message`] is its form in the file.
+//! Content of `/gluing` for a step, as the report and programs read it; [`super::gluing_message`] is its form in the file.
 
 use terraglue_gluing::StepReport;
 
@@ -80,7 +80,7 @@ pub struct WindowRecord {
     pub evaluations_soil_max: u32,
     /// Steps that did not reach their tolerance.
     pub not_converged: u64,
-    /// Largest gap, m; `None` where no step had one that says something.
+    /// Largest gap, m; `None` where no step had a meaningful one.
     pub max_gap_m: Option<f64>,
     /// Largest difference of the wrench on the two sides, N.
     pub max_action_reaction_gap_n: f64,

@@ -1,5 +1,5 @@
 //! `/overlays/<owner>/<layer>`: what subsystems and the gluing show beside the bodies, a topic for each layer, so that viewers
-//! switch it on and off. Nobody is asked where the scenario does not want it.
+//! switch it on and off. No subsystem is asked where the scenario does not want it.
 
 use crate::layout::timestamp;
 use crate::scene_message::{along, pose, quaternion, vector};
@@ -61,8 +61,8 @@ impl Overlays {
         self.layers.push((topic, channel));
     }
 
-    /// What is shown now: the topic of each layer with its message, which replaces the one before. Layers of before that show
-    /// nothing are emptied.
+    /// The current overlays: the topic of each layer with its message, which replaces the one before. Earlier layers that
+    /// show nothing now are emptied.
     pub fn read(&mut self, view: &View) -> Vec<(String, SceneUpdate)> {
         let mut all: Vec<(String, SceneUpdate)> =
             self.layers.iter().map(|(topic, _)| (topic.clone(), emptied(view.t_s))).collect();
@@ -180,7 +180,7 @@ fn draw(entity: &mut SceneEntity, overlay: &Overlay) {
     }
 }
 
-/// What is drawn needs no more than single precision, and fewer digits take less room.
+/// Drawings need no more than single precision, and fewer digits take less room.
 fn coarse(x: f64) -> f64 {
     f64::from(x as f32)
 }

@@ -9,7 +9,7 @@ use terraglue_subsystem::bytes::Persist;
 
 /// After a longer break of contact than this the next print does not belong to the same track, s.
 const BREAK_S: f64 = 0.05;
-/// What has moved further than this leaves a new print, m.
+/// A body that has moved further than this leaves a new print, m.
 pub(crate) const APART_M: f64 = 0.03;
 
 /// A place where a shape pressed for a while.

@@ -19,7 +19,7 @@ use terraglue_engine::observer::Event;
 /// Everything in a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// What was simulated.
+    /// Description of the simulation.
     pub header: Header,
     /// Variables by subsystem.
     pub variables: BTreeMap<String, Table>,
@@ -39,13 +39,13 @@ pub struct Recording {
     pub gluing: Vec<GluingRecord>,
     /// Energies, J: `kinetic`, …, and `<subsystem>.kinetic`, ….
     pub energy: Table,
-    /// What happened.
+    /// Events of the run.
     pub events: Vec<Event>,
     /// The ground at the start.
     pub initial_ground: Option<GroundRecord>,
     /// The ground at the end, or where the recording ends.
     pub final_ground: Option<GroundRecord>,
-    /// What became of it in between.
+    /// Its changes in between.
     pub(crate) ground_changes: Vec<GroundChange>,
     /// Matches of local tree maps with global ones, by stream.
     pub(crate) tree_matches: BTreeMap<String, Vec<TreeMatch>>,
@@ -105,14 +105,14 @@ impl VariableRow {
     }
 }
 
-/// What is kept from message to message.
+/// State of the reader between messages.
 #[derive(Default)]
 struct State {
     sources: BTreeMap<u16, Source>,
     rows: BTreeMap<String, VariableRow>,
 }
 
-/// What was simulated; all texts as in the scenario.
+/// Description of the simulation; all texts as in the scenario.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// All entries by name.
@@ -159,7 +159,7 @@ pub struct GroundRecord {
     pub sinkage: Vec<f32>,
 }
 
-/// Schema of the messages that tell of a [`TreeMatch`].
+/// Schema of the messages that contain a [`TreeMatch`].
 const TREE_MATCH: &str = "terraglue.TreeMatch";
 
 /// A local tree map on a global one, in the frame of the latter.
@@ -190,7 +190,7 @@ pub(crate) struct GroundChange {
 }
 
 impl GroundRecord {
-    /// Puts the nodes of a tile in; says what changed.
+    /// Puts the nodes of a tile in; returns the changes.
     fn patch(&mut self, cloud: &PointCloud, t_s: f64) -> GroundChange {
         let mut nodes = Vec::new();
         for ([x, y, z], sinkage) in point_cloud::unpack(cloud) {
@@ -235,7 +235,7 @@ fn ground(data: &[u8], t_s: f64) -> Option<GroundRecord> {
 }
 
 impl Recording {
-    /// The first record after a step: in the one before it nobody has told a force, which is no 0 N.
+    /// The first record after a step: in the one before it forces are unknown, not 0 N.
     pub fn first_step(&self) -> usize {
         self.gluing.iter().position(|g| g.evaluations_bodies > 0).unwrap_or(0)
     }
@@ -283,7 +283,7 @@ impl Recording {
         // Divided, not multiplied by 1e-9: 5 ms are 0.005 s to the bit.
         let t_s = message.log_time as f64 / 1e9;
         let data = &message.data[..];
-        // what a module gives in an encoding of its own says nothing of the run
+        // messages in an encoding of a module's own contain nothing about the run
         if let Some(stream) = message.channel.metadata.get(STREAM) {
             let schema = message.channel.schema.as_ref().map(|s| s.name.as_str());
             if schema == Some(TREE_MATCH)
@@ -377,14 +377,14 @@ impl Recording {
     }
 
     fn take_tile(&mut self, data: &[u8], t_s: f64) {
-        // The tiles of the start say less than the grid that was written with them.
+        // The tiles of the start contain less than the grid that was written with them.
         let Some(ground) = self.final_ground.as_mut().filter(|_| t_s > 0.0) else { return };
         if let Ok(cloud) = PointCloud::decode(data) {
             self.ground_changes.push(ground.patch(&cloud, t_s));
         }
     }
 
-    /// Frame and motion of the body that the report speaks of: that of the scenario, else the first one.
+    /// Frame and motion of the reported body: that of the scenario, else the first one.
     pub fn reported_body(&self) -> Option<(&str, &PoseSeries)> {
         let wanted = self.header.get("report_body").replacen('.', "/", 1);
         let found = self.poses.get_key_value(&wanted);

@@ -20,7 +20,7 @@ use terraglue_terrain::write_esri_ascii;
 mod resume;
 pub use resume::RecorderState;
 
-/// What is written beside the recording.
+/// Files that are written beside the recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RecorderOptions {
     /// Also write `variables.csv`.
@@ -52,7 +52,7 @@ pub struct Recorder {
     source: Source,
 }
 
-/// What a report needs to know of the scenario; stands at the head of the recording.
+/// Description of the scenario for reports; the header of the recording.
 fn about(scenario: &Scenario) -> BTreeMap<String, String> {
     let list = scenario.subsystems.iter().map(|s| format!("{}={}", s.name, s.module)).collect::<Vec<_>>();
     let mut about = BTreeMap::from([

@@ -13,7 +13,7 @@ pub(crate) const HEAD: usize = 9;
 /// No chunk is larger when decompressed, bytes; a damaged size asks for no more memory than this.
 const LARGEST_CHUNK: usize = 1 << 30;
 
-/// What a recording is made of.
+/// An element of a recording.
 pub(crate) enum Piece {
     /// A description.
     Metadata(Metadata),

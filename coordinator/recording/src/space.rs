@@ -6,7 +6,7 @@ use terraglue_diagnostics::error::Error;
 
 /// Name of the file that holds room until the run ends.
 pub(crate) const RESERVE: &str = ".reserve";
-/// Bytes of it: `summary.json` with a long list of events, and what is told of the last step.
+/// Bytes of it: `summary.json` with a long list of events, and the messages of the last step.
 const ROOM: usize = 128 << 10;
 
 /// Room on the disk that can be given back.
@@ -37,7 +37,7 @@ impl Drop for Reserve {
     }
 }
 
-/// What a failed write of a run means: where there was no room, the error says how much there is and up to when the run is
+/// Explains a failed write of a run: where there was no room, the error says how much there is and up to when the run is
 /// kept, `kept_s`.
 pub(crate) fn explain(error: Error, kept_s: f64) -> Error {
     match error {

@@ -19,7 +19,7 @@ pub enum Status {
     Stopped,
 }
 
-/// What stopped a run.
+/// The failure that stopped a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FailureRecord {
     /// Module that failed; null where no module did.
@@ -28,7 +28,7 @@ pub struct FailureRecord {
     pub function: Option<String>,
     /// Simulated time, s.
     pub time_s: Option<f64>,
-    /// What happened.
+    /// Error message.
     pub message: String,
 }
 
@@ -75,7 +75,7 @@ impl From<&Error> for FailureRecord {
 pub struct Summary {
     /// How the run ended.
     pub status: Status,
-    /// What stopped it; null unless `failed`.
+    /// The failure that stopped it; null unless `failed`.
     pub error: Option<FailureRecord>,
     /// Events, changes and warnings in order of time.
     pub events: Vec<Event>,

@@ -17,7 +17,7 @@ use terraglue_subsystem::{Causality, Kind};
 
 mod state;
 
-/// Over a shorter way, m, the energy per distance says nothing.
+/// Over a shorter way, m, the energy per distance is meaningless.
 const SMALLEST_DISTANCE_M: f64 = 1e-3;
 
 /// Follows a run and adds up its figures.
@@ -42,7 +42,7 @@ pub struct SummaryObserver {
     gluing: GluingSums,
 }
 
-/// Integral of a variable over time. What is set holds over the step that follows, what is told is of the step before.
+/// Integral of a variable over time. Set values hold over the step that follows, reported values belong to the step before.
 struct Integral {
     subsystem: usize,
     id: u32,
@@ -67,7 +67,7 @@ struct GluingSums {
     soil: u64,
     soil_max: u32,
     not_converged: u64,
-    /// Steps that had a tolerance to reach, and those whose gap says something.
+    /// Steps that had a tolerance to reach, and those whose gap is meaningful.
     checked: u64,
     with_gap: u64,
     tt_steps: u64,
@@ -190,7 +190,7 @@ impl GluingSums {
     }
 
     fn summary(&self) -> GluingSummary {
-        // what no step could say does not apply; before the first step nothing is known to be amiss
+        // a figure that no step could give does not apply; before the first step nothing is known to be amiss
         let applies = |steps: u64| self.steps == 0 || steps > 0;
         GluingSummary {
             form: self.form().into(),

@@ -41,7 +41,7 @@ impl Table {
         self.t_s.push(t_s);
         for (place, value) in places.iter().zip(values) {
             if let Some(k) = place {
-                // What has no bound is infinite; nothing that is drawn or compared is.
+                // Missing bounds are infinite; nothing that is drawn or compared is.
                 self.columns[*k].push(if value.is_finite() { *value } else { f64::NAN });
             }
         }

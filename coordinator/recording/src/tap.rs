@@ -1,4 +1,4 @@
-//! Who else gets what a recorder writes: the topics and messages of a run while it goes on, the same bytes as in the file.
+//! Taps of a recorder: they receive topics and messages while a run goes on, the same bytes as in the file.
 
 use crate::topics::Topic;
 use mcap::records::MessageHeader;
@@ -19,7 +19,7 @@ pub struct TopicInfo {
     pub schema_encoding: String,
     /// The description; of Protobuf a `FileDescriptorSet`.
     pub schema_data: Vec<u8>,
-    /// What the type cannot say.
+    /// Information that the type cannot hold.
     pub metadata: BTreeMap<String, String>,
 }
 

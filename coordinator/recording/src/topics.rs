@@ -1,4 +1,4 @@
-//! The topics of a recording: their names, message types, and what the types cannot say.
+//! The topics of a recording: their names, message types, and the metadata that the types cannot hold.
 //!
 //! Poses, shapes, ground, forces and events are messages that robotics viewers know by name; the types of our own are
 //! made when a run starts, of the names of its variables.

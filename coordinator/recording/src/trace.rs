@@ -77,7 +77,7 @@ impl Trace {
     /// Adds a row of the committed values.
     ///
     /// # Errors
-    /// What a subsystem answers instead of numbers.
+    /// The error of a subsystem whose values cannot be read.
     pub fn take(&mut self, testbed: &Testbed) -> Result {
         let instances: &[Instance] = testbed.instances();
         let row = self.values.len();

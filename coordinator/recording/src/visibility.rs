@@ -5,7 +5,7 @@ use terraglue_diagnostics::error::Result;
 use terraglue_engine::observer::View;
 use terraglue_subsystem::Capabilities;
 
-/// What is shown, as it was looked at last.
+/// Visibility of shapes when last read.
 #[derive(Debug, Default)]
 pub(crate) struct Visibility {
     /// Numbers of subsystems with a flag for each of their shapes.

@@ -21,7 +21,7 @@ pub struct Candidate {
     pub is_new: bool,
 }
 
-/// What has to be done, without a reference to the run.
+/// Work of a preparation, without a reference to the run.
 pub struct Preparation {
     /// Folder of the scenario, where the build command runs.
     pub folder: PathBuf,

@@ -3,7 +3,7 @@
 //! The file of a module is looked at between steps, and so are its sources where its table gives a `build` command. New
 //! code is copied to a name of its own (the path of a loaded library gives the old code when it is opened again), put to
 //! the quick tests of `check-module` in other processes while the old code goes on, and exchanged at the next communication
-//! point. What cannot be built, is found wrong or cannot take over the state changes nothing but a line of the log.
+//! point. Code that cannot be built, fails a test or cannot take over the state changes nothing but a line of the log.
 //!
 //! Files are polled, not subscribed to: an exchange happens between two steps anyway, where a look at a few files costs
 //! microseconds, and polling also sees network folders, containers, and libraries that a linker puts in place by renaming.
@@ -281,7 +281,7 @@ impl Reloader {
         testbed: &mut Testbed,
     ) {
         let name = self.watched[k].name();
-        // What a build command has written is known now.
+        // The file that the build command has written is known now.
         self.watched[k].seen[0] = Stamp::of(&self.watched[k].file);
         let done = match ready {
             Ok(None) => return,
@@ -354,7 +354,7 @@ impl Drop for Reloader {
     fn drop(&mut self) {
         for job in self.watched.iter_mut().filter_map(|w| w.job.take()) {
             end_group(job.build.load(Ordering::Relaxed));
-            // What it found is not wanted any more.
+            // Its result is not needed any more.
             drop(job.thread.join());
         }
     }

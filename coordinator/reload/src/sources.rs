@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 use terraglue_scenario::SubsystemSpec;
 
-/// What a file or a folder of sources looked like.
+/// Stamp of a file or a folder of sources.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stamp {
     files: u64,

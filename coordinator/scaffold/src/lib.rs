@@ -26,7 +26,7 @@ pub struct Scaffold {
     pub files: Vec<(String, String)>,
     /// Files that a module in Rust brings with it: the crates of the interface, and the versions of what they use.
     pub crates: &'static [(&'static str, &'static str)],
-    /// What to type next, inside the folder.
+    /// The next commands to type, inside the folder.
     pub commands: [String; 2],
 }
 
@@ -53,11 +53,11 @@ pub enum ScaffoldError {
     /// This kind cannot be written in this language.
     #[error("a {kind} in {language} is not offered; languages: {offered}")]
     Language {
-        /// What was to be made.
+        /// The kind that was asked for.
         kind: &'static str,
-        /// In what.
+        /// The language that was asked for.
         language: &'static str,
-        /// What is offered.
+        /// Languages that are offered.
         offered: String,
     },
     /// There is something in the way.
@@ -73,7 +73,7 @@ pub enum ScaffoldError {
     },
 }
 
-/// The files of a new module; `program` stands in the commands to type, the files call it `terraglue`.
+/// The files of a new module; the commands to type call the program `program`, the files call it `terraglue`.
 ///
 /// # Errors
 /// A name that cannot be used, a language that is not offered.

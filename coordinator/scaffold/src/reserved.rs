@@ -11,7 +11,7 @@ const PYTHON_WORDS: &str = include_str!("reserved/python_words.txt");
 /// Crates that come with the compiler, and words of the language Rust.
 const RUST: &str = include_str!("reserved/rust_words.txt");
 
-/// What a module of this name would be in the way of; None: nothing.
+/// The thing that a module of this name would hide; None: nothing.
 pub(super) fn taken(name: &str, language: Language) -> Option<&'static str> {
     let file = name.replace('-', "_");
     let among = |words: &str| words.split_ascii_whitespace().any(|word| word == file);

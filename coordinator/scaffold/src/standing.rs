@@ -13,7 +13,7 @@ const GRAVITY: f64 = 1.62;
 const GIVES: [f64; 2] = [0.02, 0.005];
 /// Damping over stiffness, s.
 const SETTLES: f64 = 0.02;
-/// Motors carry the weight this many times, where the file says nothing.
+/// Motors carry the weight this many times, where the file gives no limit.
 const RESERVE: f64 = 5.0;
 /// Most cells along a side of the ground: it is loaded and recorded within seconds.
 const MOST_CELLS: f64 = 3000.0;
@@ -65,7 +65,7 @@ impl<'a> Standing<'a> {
         })
     }
 
-    /// What the user should know before the first run: the centre of mass lies beside what touches.
+    /// Warning before the first run where the centre of mass lies beside the touching bodies.
     pub fn doubt(&self) -> Option<String> {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for b in &self.touching {
@@ -304,12 +304,12 @@ fn pose(robot: &Robot) -> Vec<f64> {
     coordinates
 }
 
-/// What is said of the spacing.
+/// Note on the spacing of the ground.
 const FINE: &str = "six nodes across the narrowest thing that touches";
 /// See [`FINE`]; of a robot so large that its ground would have too many nodes.
 const COARSE: &str = "coarse: a ground of this size with six nodes across what touches would be too large";
 
-/// What a joint is held with.
+/// Gains that hold a joint.
 struct Gains {
     stiffness: f64,
     damping: f64,

@@ -5,7 +5,7 @@ use super::{Scaffold, ScaffoldError};
 /// Paths and texts of the crates that a module in Rust is made of.
 const CRATES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/crates.rs"));
 
-/// What can be made.
+/// Kinds of modules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Ground.
@@ -16,7 +16,7 @@ pub enum Kind {
     Controller,
     /// Pressure and shear of a soil.
     Law,
-    /// What looks at the others.
+    /// Observer of the other subsystems.
     Sensor,
 }
 

@@ -1,4 +1,4 @@
-//! What of a scenario has no effect although nothing is wrong with it: said in warnings, never an error.
+//! Warnings about parts of a scenario that are valid but have no effect; never an error.
 
 use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
 use super::isolation::IsolationSpec;
@@ -25,7 +25,7 @@ pub fn late_events(scenario: &Scenario) -> Vec<String> {
     .collect()
 }
 
-/// Steps of a run beyond which it is said before it starts, and beyond which it is refused.
+/// Steps of a run beyond which a warning is given, and beyond which it is refused.
 const MANY_STEPS: f64 = 1e8;
 /// See [`MANY_STEPS`]: at a microsecond a step, which no subsystem needs less than, a quarter of an hour.
 pub(super) const MOST_STEPS: f64 = 1e9;
@@ -45,7 +45,7 @@ pub fn many_steps(scenario: &Scenario) -> Option<String> {
         .then(|| line_of(&scenario.source.error_at_value(&["time", "step_s"], message(), None)))
 }
 
-/// Keys of `[gluing]` that only some strategies read, with what they say where they say nothing.
+/// Keys of `[gluing]` that only some strategies read, and whether each differs from its default.
 type Reader = (&'static str, fn(&GluingSpec) -> bool, &'static [StrategyKind]);
 const READERS: [Reader; 6] = [
     ("form", |g| g.form != FormChoice::Auto, &[StrategyKind::Iterative, StrategyKind::CooperativeCompliant]),
@@ -116,7 +116,7 @@ pub fn unchosen(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Optio
     Some(format!("{} (no effect now: `{}` has `module = \"{module}\"`)", line_of(&wrong), spec.name))
 }
 
-/// What a kind of module advises on its parameters, at the places of the keys.
+/// Advice of a kind of module on its parameters, at the places of the keys.
 pub fn of_module(scenario: &Scenario, spec: &SubsystemSpec, advice: Vec<Advice>) -> Vec<String> {
     let said = |Advice { key, message }: Advice| {
         line_of(&scenario.source.error_at_value(&[&spec.name, key], message, None))
@@ -131,7 +131,7 @@ pub fn regions(spec: &SubsystemSpec) -> Vec<(String, Map<String, Value>)> {
     spec.regions.iter().map(of).collect()
 }
 
-/// Names of one's own in `[SOIL.law.parameters]` that no text of the law uses, or that stand for a number of the soil.
+/// Names of one's own in `[SOIL.law.parameters]` that no text of the law uses, or that hide a number of the soil.
 pub fn law_parameters(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Vec<String> {
     let Some(law) = spec.parameters.get("law").and_then(|law| law.as_object()) else { return Vec::new() };
     let own = law.get("parameters").and_then(|own| own.as_object());

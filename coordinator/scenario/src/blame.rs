@@ -49,7 +49,7 @@ fn last_edit(node: &Node) -> Option<&Place> {
     own.into_iter().chain(below).max_by_key(|at| at.set)
 }
 
-/// What of a message can be a name: what stands in backquotes, then words with an underscore.
+/// Parts of a message that can be a name: those in backquotes, then words with an underscore.
 fn names(message: &str) -> impl Iterator<Item = &str> {
     let quoted = message.split('`').skip(1).step_by(2);
     let is_of_name = |c: char| c.is_alphanumeric() || "_.".contains(c);

@@ -1,4 +1,4 @@
-//! Keys whose values are a fixed list of names, as enums: a `match` over one has no arm for a name that nobody knows.
+//! Keys whose values are a fixed list of names, as enums: a `match` over one has no arm for unknown names.
 
 /// An enum whose variants have a name each, in the order of the documentation.
 macro_rules! named {
@@ -73,7 +73,7 @@ named! {
 }
 
 named! {
-    /// What the iteration of a step begins with: `gluing.start`.
+    /// Initial guess of the iteration of a step: `gluing.start`.
     StartChoice {
         /// min(T*, F), from the estimate of the bodies and the law of the soil.
         Estimate = "estimate",

@@ -1,4 +1,4 @@
-//! What two scenarios differ in, key by key: a recording carries the text of its own.
+//! Differences of two scenarios, key by key: a recording carries the text of its own.
 
 use super::node::Node;
 use serde_json::Value;

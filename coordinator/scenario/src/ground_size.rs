@@ -8,7 +8,7 @@ const BYTES_PER_NODE: f64 = 45.0;
 
 /// A ground with more nodes than fit.
 pub struct TooMany {
-    /// What it makes and needs.
+    /// Its nodes and the memory that they need, in words.
     pub what: String,
     /// A spacing that fits, m.
     fits_m: f64,
@@ -43,7 +43,7 @@ pub fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<TooMany> {
     Some(TooMany { what, fits_m })
 }
 
-/// What helps where a scenario gives the size.
+/// The way out where a scenario gives the size.
 pub const SMALLER: &str = "make `size_m` smaller";
 
 /// Most cells along a side.

@@ -22,7 +22,7 @@ pub struct Table {
 pub struct Key {
     /// Name, type, range, default, help.
     pub parameter: Parameter,
-    /// What else the value may look like.
+    /// Shape of the value beyond the parameter.
     pub form: Form,
     /// Values of `kind` that know this key; empty: all.
     pub only: &'static [&'static str],

@@ -1,4 +1,4 @@
-//! `[soil.mask.rows]`: the soils that the labels of a mask stand for.
+//! `[soil.mask.rows]`: the soils of the labels of a mask.
 
 use super::model::Region;
 use super::node::{Node, Raw};

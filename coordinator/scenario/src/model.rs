@@ -140,7 +140,7 @@ pub enum TerrainKind {
     Png {
         /// File.
         file: PathBuf,
-        /// What its greys mean.
+        /// Meaning of its greys.
         greys: Greys,
         /// Height that replaces transparent pixels; refused when absent.
         fill_m: Option<f64>,
@@ -154,7 +154,7 @@ pub enum TerrainKind {
     },
 }
 
-/// What the grey of a picture means.
+/// Meaning of the grey of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Greys {
     /// Distance of pixels, m.
@@ -178,7 +178,7 @@ pub struct GluingSpec {
     pub max_iterations: u32,
     /// How often a step that does not converge may be halved before the run stops.
     pub max_halvings: u32,
-    /// What the iteration starts from.
+    /// Initial guess of the iteration.
     pub start: StartChoice,
     /// How `relaxed` accelerates its fixed point.
     pub relaxation: Relaxation,
@@ -218,7 +218,7 @@ pub struct RecordingSpec {
 /// `[report]`.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct ReportSpec {
-    /// `subsystem.body` that distance, roll and pitch speak of; the first body of the first robot when empty.
+    /// `subsystem.body` whose distance, roll and pitch are reported; the first body of the first robot when empty.
     pub body: Option<String>,
     /// `subsystem.variable` with the commanded speed, m/s.
     pub commanded_speed: Option<String>,
@@ -241,7 +241,7 @@ pub struct SweepSpec {
     pub table: Option<PathBuf>,
     /// Keys of `summary.json` and variables beside the usual figures.
     pub collect: Vec<String>,
-    /// What differs from run to run.
+    /// Keys that differ from run to run.
     pub vary: Vec<VariedKey>,
 }
 
@@ -293,12 +293,12 @@ impl PageSpec {
         plot.split([',', '@']).map(str::trim)
     }
 
-    /// What the text of a scenario says, as the page reads it; none where it says nothing.
+    /// `[page]` of the text of a scenario, as the page reads it; none where it is absent.
     pub fn of_text(text: &str) -> Option<Value> {
         Scenario::parse(text, "scenario.toml", &[]).ok()?.page.to_json()
     }
 
-    /// As the page reads it; none where nothing was said.
+    /// As the page reads it; none where nothing was given.
     pub fn to_json(&self) -> Option<Value> {
         let all = [
             ("camera", self.camera.clone().map(Value::from)),
@@ -387,15 +387,15 @@ pub struct Connection {
     pub convert: bool,
     /// When within a step its value is passed.
     pub order: ConnectionOrder,
-    /// What the input follows where it is read at the start of a step.
+    /// Extrapolation of the input where it is read at the start of a step.
     pub extrapolate: Extrapolate,
-    /// What each value becomes, of truth values, whole numbers and enumerations; empty: what it is.
+    /// New value for each truth value, whole number or item of an enumeration; empty: unchanged.
     pub map: Vec<(String, Value)>,
     /// Where it stands.
     pub entry: Entry,
 }
 
-/// What an input follows over a step that begins with the output that feeds it.
+/// Extrapolation of an input over a step that begins with the output that feeds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Extrapolate {
     /// It is held.
@@ -403,7 +403,7 @@ pub enum Extrapolate {
     Constant,
     /// The line through the last two values.
     Linear,
-    /// The line along the derivative that the source tells.
+    /// The line along the derivative that the source provides.
     Derivatives,
 }
 
@@ -479,7 +479,7 @@ pub struct EventSpec {
 pub struct FaultSpec {
     /// `subsystem.variable`.
     pub variable: String,
-    /// What happens to its numbers.
+    /// Effect on its numbers.
     pub kind: FaultKind,
     /// From when on.
     pub start: Trigger,
@@ -491,7 +491,7 @@ pub struct FaultSpec {
     pub entry: Entry,
 }
 
-/// What a fault makes of a number x.
+/// Effect of a fault on a number x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
     /// This value.
@@ -502,11 +502,11 @@ pub enum FaultKind {
     Gain(f64),
     /// x + this · time since the fault began, 1/s.
     Ramp(f64),
-    /// What x was when the fault began.
+    /// The value of x when the fault began.
     Freeze,
-    /// What x was so long ago, s.
+    /// The value of x so long ago, s.
     Delay(f64),
-    /// With this probability per step what was told last.
+    /// With this probability per step the value passed last.
     DropOut(f64),
     /// x + a normal random number with this deviation.
     Noise(f64),

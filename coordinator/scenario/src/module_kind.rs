@@ -1,8 +1,8 @@
-//! What the file of a subsystem is, by its name.
+//! The kind of the file of a subsystem, by its name.
 
 use std::path::Path;
 
-/// What the value of `module` or `fmu` leads to.
+/// Kind of the file that the value of `module` or `fmu` names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModuleKind {
     /// A dynamic library, or a module that is linked into the program.

@@ -1,7 +1,7 @@
 //! Values that are allowed but far from what is usual, most often since their unit is another one: warned of with the likely
 //! slip, never refused.
 //!
-//! What is usual a module says in its schema ([`Usual`]).
+//! A module gives the usual values in its schema ([`Usual`]).
 
 use super::advice::line_of;
 use super::model::{Scenario, SubsystemSpec};
@@ -22,7 +22,7 @@ const SLIPS: &[(&str, Slips)] = &[
     ("degrees", &[("rad", 180.0 / std::f64::consts::PI)]),
 ];
 
-/// What is doubtful about the value `x` of `what`: how far it is from usual ones, and the unit in which it would be one.
+/// Doubt about the value `x` of `what`: how far it is from usual ones, and the unit in which it would be one.
 pub fn doubt(usual: &Usual, what: &str, x: f64) -> Option<String> {
     let [low, high] = usual.span;
     if x == 0.0 || !x.is_finite() || (low..=high).contains(&x) {

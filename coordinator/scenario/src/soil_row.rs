@@ -34,7 +34,7 @@ pub fn gives(parameter: &str) -> bool {
 /// Reads a soil table.
 ///
 /// # Errors
-/// What is wrong with the file, with its path.
+/// A file that cannot be read or is malformed, with its path.
 pub fn read_soil_table(path: &Path) -> Result<SoilTable, String> {
     let text = terraglue_subsystem::files::read_text(path)
         .map_err(|e| format!("cannot read {}: {e}", path.display()))?;
@@ -55,7 +55,7 @@ pub fn offered(
     numbers(source, name, node, &row, &overridden, &place)
 }
 
-/// The numbers of a row, or of a soil file, that stands at `place` in the subsystem's table.
+/// The numbers of a row, or of a soil file, that is named at `place` in the subsystem's table.
 pub fn numbers(
     source: &Source,
     name: &str,

@@ -18,7 +18,7 @@ pub const COLUMNS: [&str; 10] = [
 const OPTIONAL: [&str; 4] =
     ["density_kg_m3", "elastic_stiffness_pa_m", "measured_gravity_m_s2", "wall_cohesion_pa"];
 
-/// What is wrong with a table or a name.
+/// Errors of a table or a name.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TableError {
@@ -26,7 +26,7 @@ pub enum TableError {
     Malformed {
         /// Line of the text, from 1.
         line: usize,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
     /// No row has this name.
@@ -68,7 +68,7 @@ pub struct SoilRow {
     pub values: [Option<f64>; COLUMNS.len()],
     /// Where the numbers come from.
     pub source: String,
-    /// How far they can be trusted; empty where the table does not say.
+    /// Confidence in them; empty where the table gives none.
     pub confidence: String,
     /// Why the row cannot be used as it stands.
     pub refused: Option<String>,
@@ -135,7 +135,7 @@ fn malformed(line: usize, what: impl Into<String>) -> TableError {
     TableError::Malformed { line: line + 1, what: what.into() }
 }
 
-/// Where the columns stand in the header.
+/// Places of the columns in the header.
 struct Columns {
     name: usize,
     numbers: [Option<usize>; COLUMNS.len()],

@@ -108,7 +108,7 @@ fn fmu_path(source: &Source, node: &Node) -> Result<String, Box<InputError>> {
     Ok(path)
 }
 
-/// The module's parameters; those in the sub-table that bears the module's name come on top.
+/// The module's parameters; those in the sub-table with the module's name come on top.
 fn parameters(node: &Node, module: &str, is_host_key: impl Fn(&str) -> bool) -> Map<String, Value> {
     let entries = node.entries().iter().filter(|(key, _)| !is_host_key(key) && key != module);
     let mut all: Map<String, Value> = entries.map(|(key, n)| (key.clone(), n.to_json())).collect();

@@ -16,7 +16,7 @@ type Checked<T> = Result<T, Box<InputError>>;
 pub struct SweepPlan {
     /// File of the scenario.
     pub scenario: PathBuf,
-    /// What differs from run to run.
+    /// Its `[sweep]`.
     pub spec: SweepSpec,
     source: Source,
 }

@@ -12,7 +12,7 @@ use terraglue_diagnostics::Result;
 pub struct Beside {
     /// Where its messages are read.
     pub(crate) hub: Arc<Hub>,
-    /// What it is called: the name of its folder.
+    /// Name of its folder.
     pub name: String,
     /// First and last time, s.
     times: [f64; 2],
@@ -36,7 +36,7 @@ impl Beside {
         Ok(Self { hub, name, times })
     }
 
-    /// What the page has to know to read its messages.
+    /// Name, times and channels, with which the page reads its messages.
     pub(crate) fn about(&self) -> Value {
         let channels = protocol::advertise(&self.hub.topics())["channels"].take();
         json!({ "name": self.name, "from_s": self.times[0], "to_s": self.times[1], "channels": channels })

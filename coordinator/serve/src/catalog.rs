@@ -7,7 +7,7 @@ use terraglue_host::Instance;
 use terraglue_recording::TopicInfo;
 use terraglue_subsystem::{Causality, Effect, ValueType, Variable};
 
-/// What kind of value it is, for people and forms.
+/// Name of the kind of a value, for people and forms.
 fn kind(of: ValueType) -> &'static str {
     match of {
         ValueType::F64 | ValueType::F32 => "real",
@@ -45,7 +45,7 @@ fn variable(id: &str, subsystem: &str, v: &Variable, start: &Value) -> Value {
         "choices": v.enumeration,
         "unit": v.unit,
         "help": v.help,
-        // JSON knows no infinity: no bound is null
+        // JSON has no infinity: no bound is null
         "min": v.min,
         "max": v.max,
         "effect": effect(v.effect),
@@ -101,7 +101,7 @@ fn shown(of: ValueType, names: &[String], number: f64) -> Value {
     }
 }
 
-/// `/variables` of a recording: what its channels say of themselves; all are read only.
+/// `/variables` of a recording, from the metadata of its channels; all are read only.
 pub fn recorded(topics: &[TopicInfo]) -> Value {
     let mut all = Vec::new();
     for topic in topics {

@@ -1,4 +1,4 @@
-//! What clients have changed in a run: in their order for doing it again, by variable for undoing it.
+//! The changes that clients made to a run: in order, to repeat them; by variable, to undo them.
 
 use serde_json::{Value, json};
 use terraglue_scenario::Scenario;
@@ -31,7 +31,7 @@ pub struct Change {
     pub step: u64,
     /// Simulated time, s.
     pub t_s: f64,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
 }
 

@@ -1,4 +1,4 @@
-//! What clients ask of a run. Commands are taken between two steps; each is answered, or refused with the reason.
+//! Commands of clients to a run. They are taken between two steps; each is answered, or refused with the reason.
 
 use serde_json::Value;
 use tokio::sync::oneshot;
@@ -45,7 +45,7 @@ pub enum Command {
 
 /// A command with whoever waits for the answer.
 pub struct Request {
-    /// What is asked.
+    /// The command.
     pub command: Command,
     /// Where the answer goes.
     pub reply: oneshot::Sender<Result<Value, String>>,

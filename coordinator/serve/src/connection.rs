@@ -21,7 +21,7 @@ const NEVER: Duration = Duration::from_secs(86_400);
 /// Whether the connection goes on.
 type Goes = Result<(), axum::Error>;
 
-/// Whether each message of a topic stands for itself: what comes later takes its place.
+/// Whether each message of a topic is complete in itself: a later one replaces it.
 fn only_newest_counts(topic: &str, schema: &str) -> bool {
     let own = topic == "/tf" || topic.starts_with("/joints/") || topic.starts_with("/contact_forces");
     own || ["foxglove.PointCloud", "foxglove.LaserScan"].contains(&schema)
@@ -44,7 +44,7 @@ pub struct Connection {
     subscriptions: HashMap<u16, u32>,
     /// Channels of which only the newest message counts, with that message until the next beat.
     held: BTreeMap<u16, Option<Arc<Stored>>>,
-    /// What was sent last of the channels on which something stands.
+    /// Message sent last on each channel whose last message stays valid.
     sent: HashMap<u16, Arc<Stored>>,
     followed: BTreeSet<String>,
     services: Vec<String>,
@@ -161,14 +161,14 @@ impl Connection {
         socket.send(Message::Binary(bytes.into())).await
     }
 
-    /// The state of the run says of each client whether it may write.
+    /// The state of the run with the permission of this client to write.
     fn run_state(&self, message: &Stored) -> Stored {
         let mut state: Value = serde_json::from_slice(&message.data).unwrap_or_default();
         state["may_write"] = (self.trusted && self.hub.may_write(self.number, false)).into();
         Stored { data: state.to_string().into_bytes(), ..message.clone() }
     }
 
-    /// Says that messages were left out, and sends what stands.
+    /// Reports that messages were omitted, and sends the last ones again.
     async fn behind(&mut self, socket: &mut WebSocket) -> Goes {
         let mut told =
             protocol::status(0, "messages were left out: this client reads more slowly than the run goes");
@@ -177,7 +177,7 @@ impl Connection {
         self.again(socket).await
     }
 
-    /// What stands, of everything that is subscribed to; not again what was sent as it is.
+    /// Sends the last message of every subscribed channel, unless it was sent already.
     async fn again(&mut self, socket: &mut WebSocket) -> Goes {
         let mut channels: Vec<u16> = self.subscriptions.keys().copied().collect();
         channels.sort_unstable();

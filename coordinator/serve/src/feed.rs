@@ -1,4 +1,4 @@
-//! What a recorder writes, on its way to clients: kept until the file has it, and handed to whoever listens.
+//! Messages of a recorder on their way to clients: kept until the file has them, and handed to all listeners.
 
 use crate::hub::{Hub, Out};
 use crate::tail::Tail;

@@ -106,7 +106,7 @@ impl Ground {
     /// First and last node of what was put in, along x and y.
     fn put_nodes(&mut self, tile: &Stored) -> Option<[[usize; 2]; 2]> {
         let points = ground_cloud(&tile.data)?;
-        // a large ground is drawn by every second, third, … node: each stands for those beside it
+        // a large ground is drawn by every second, third, … node: each represents its neighbours
         let x = |k: usize| points.get(k).map(|(p, _)| p[0]);
         let step = (x(1)? - x(0)?).abs() / self.spacing;
         let stride = if step.is_finite() { (step.round() as usize).max(1) } else { 1 };

@@ -127,7 +127,7 @@ impl Hub {
 
     /// Sends something to all.
     pub fn send(&self, out: Out) {
-        // an error says that nobody listens
+        // an error means that nobody listens
         drop(self.ring.send(out));
     }
 
@@ -212,7 +212,7 @@ impl Hub {
         read(&self.file).as_ref().map(act).transpose()
     }
 
-    /// Metadata of all topics, for the page: what their messages cannot say.
+    /// Publishes the metadata of all topics for the page: information that messages cannot hold.
     pub fn publish_channels(&self) {
         let mut all = Map::new();
         for topic in read(&self.topics).iter().filter(|t| !t.metadata.is_empty()) {

@@ -27,16 +27,16 @@ use terraglue_recording::{
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::{Capabilities, Effect};
 
-/// How often the state of a run is told.
+/// Period at which the state of a run is sent.
 pub const STATE_EVERY: Duration = Duration::from_millis(200);
-/// How often values of variables are told.
+/// Period at which values of variables are sent.
 const VALUES_EVERY: Duration = Duration::from_millis(100);
 /// How long a run that stands still waits for a command before it looks whether it is to end.
 pub const ANSWER_WITHIN: Duration = Duration::from_millis(50);
 /// Simulated time between states to go back to, s.
 const SNAPSHOT_EVERY_S: f64 = 1.0;
 
-/// What is run.
+/// A run to be made.
 pub struct Mission<'a> {
     /// The scenario with its edits.
     pub scenario: &'a Scenario,
@@ -52,7 +52,7 @@ pub struct Mission<'a> {
     pub stays: bool,
     /// Memory for states to go back to, bytes.
     pub budget: usize,
-    /// Tells the error when a module or FMU ends the program.
+    /// Reports the error when a module or FMU ends the program.
     pub tell: fn(&Error),
 }
 
@@ -77,7 +77,7 @@ impl State {
 
 /// How a run has ended.
 pub struct Ended {
-    /// What stopped it.
+    /// The error that stopped it.
     pub error: Option<Error>,
     /// Whether it reached its end.
     pub is_done: bool,
@@ -429,7 +429,7 @@ impl<'a> Live<'a> {
         Ok(())
     }
 
-    /// All that clients know is to be read again.
+    /// Makes clients read all data again.
     fn restarted(&mut self, state: State) {
         self.state = state;
         self.steps_left = None;
@@ -502,7 +502,7 @@ impl<'a> Live<'a> {
     fn again(&mut self, from: u64, target: u64) -> Result {
         let mut told = Instant::now();
         for step in from..target {
-            // a server that says nothing for long is taken for gone
+            // clients take a server that is silent for long for gone
             if told.elapsed() >= STATE_EVERY {
                 told = Instant::now();
                 self.hub.send(Out::Time(nanoseconds(self.testbed.t_s())));

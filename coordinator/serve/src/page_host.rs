@@ -23,17 +23,17 @@ const LARGEST: usize = 256 << 20;
 
 /// Something that the page made.
 pub struct Posted {
-    /// What it is: the last part of the address that it was sent to.
+    /// Its kind: the last part of the address that it was sent to.
     pub kind: String,
     /// Time that the page gives it, µs.
     pub time_us: u64,
     /// Whether it needs nothing that came before it.
     pub is_whole: bool,
-    /// What is in it.
+    /// Its content.
     pub body: Bytes,
 }
 
-/// What a page says of something that it posts.
+/// Attributes of something that a page posts.
 #[derive(Deserialize)]
 struct Label {
     #[serde(default)]

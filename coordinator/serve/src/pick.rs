@@ -1,4 +1,4 @@
-//! What is under the pointer: the first hit of a ray among all shapes and grounds of a testbed.
+//! The object under the pointer: the first hit of a ray among all shapes and grounds of a testbed.
 
 use serde_json::{Value, json};
 use terraglue_engine::testbed::Testbed;

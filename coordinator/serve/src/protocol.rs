@@ -1,5 +1,5 @@
-//! The Foxglove WebSocket protocol (`foxglove.websocket.v1`, and `foxglove.sdk.v1` which says the same): texts are JSON with `op`,
-//! binary messages begin with a byte that says what they are. All numbers are little-endian.
+//! The Foxglove WebSocket protocol (`foxglove.websocket.v1`, and `foxglove.sdk.v1`, which is the same): texts are JSON with
+//! `op`, binary messages begin with a byte for their kind. All numbers are little-endian.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -10,7 +10,7 @@ use terraglue_recording::{Stored, TopicInfo};
 /// Names under which clients ask for it.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
-/// What every client is told first.
+/// Content of the first message to every client.
 #[derive(Clone, Default)]
 pub struct Welcome {
     /// Name of the run.
@@ -76,7 +76,7 @@ pub struct Subscription {
 pub struct Parameter {
     /// Full name.
     pub name: String,
-    /// What it is to be.
+    /// The value to set.
     #[serde(default)]
     pub value: Value,
 }
@@ -173,7 +173,7 @@ pub fn unadvertise_services(count: usize) -> Value {
 /// Values of variables; with the number of whoever asked.
 pub fn parameter_values(values: &[(String, Value)], id: Option<&str>) -> Value {
     let one = |(name, value): &(String, Value)| match value {
-        // a client of JavaScript writes 0 for 0.0: the type says what it is
+        // a client in JavaScript writes 0 for 0.0: the type distinguishes them
         Value::Number(n) if n.is_f64() => json!({ "name": name, "value": value, "type": "float64" }),
         _ => json!({ "name": name, "value": value }),
     };

@@ -129,7 +129,7 @@ impl Replay {
         Ok(json!({ "t_s": self.t_s }))
     }
 
-    /// Goes on by what the clock says, and sends all messages in between.
+    /// Goes on to the time of the clock, and sends all messages in between.
     fn play(&mut self) -> Result {
         let mut to = self.t_s;
         // in pieces, so that a pace that cannot be held is not waited for

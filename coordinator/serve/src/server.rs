@@ -28,7 +28,7 @@ const MESH_EVERY: u32 = 5;
 /// Most points of a variable over time.
 const MOST_POINTS: usize = 200_000;
 
-/// What the routes share.
+/// State shared by all routes.
 #[derive(Clone)]
 struct Shared {
     hub: Arc<Hub>,
@@ -145,7 +145,7 @@ struct Token {
     token: Option<String>,
 }
 
-/// What a client wants of the socket.
+/// Options of a client for the socket.
 #[derive(Deserialize)]
 struct Wishes {
     /// Of poses, forces and clouds only the newest, so often.

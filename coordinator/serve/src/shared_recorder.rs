@@ -23,7 +23,7 @@ impl SharedRecorder {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Closes the recording with an error, which is told, and writes the report in `folder` when a module or FMU ends the process.
+    /// Closes the recording with an error, reports it, and writes the report in `folder` when a module or FMU ends the process.
     #[must_use]
     pub fn exit_hook(&self, scenario: &Scenario, folder: &Path, tell: fn(&Error)) -> ExitHook {
         let recorder = Arc::clone(&self.0);

@@ -1,4 +1,4 @@
-//! Topics of our own, beside those of the recording: latched JSON that says what the protocol cannot.
+//! Topics of our own, beside those of the recording: latched JSON for information that the protocol cannot hold.
 
 use crate::ground_mesh::ground_mesh_topic;
 use terraglue_recording::TopicInfo;

@@ -1,4 +1,4 @@
-//! Measurements as comma-separated text; the unit stands in the name of a column.
+//! Measurements as comma-separated text; the name of a column contains the unit.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -16,7 +16,7 @@ const NUMBERS: &str = "a comma ends a cell: write numbers with a point, as 1.5 o
 const HEADED: &str =
     "measurements are text with commas between the cells and the names of the columns in the first line";
 
-/// What is wrong, and the way out.
+/// Description of a problem, and the way out.
 pub type Wrong = (String, Option<String>);
 
 /// Name of a column and how many SI units its unit has.

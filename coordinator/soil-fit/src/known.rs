@@ -1,5 +1,5 @@
-//! What the command line gives beside the tests: options, each within the range of its scenario key, over a row of the
-//! soil table.
+//! Known parameters of the soil from the command line: options, each within the range of its scenario key, over a row of
+//! the soil table.
 
 use super::{Known, WheelStart};
 use serde_json::Value;
@@ -33,7 +33,7 @@ impl Options {
         ]
     }
 
-    /// What is doubtful about the values, as of the keys of a scenario.
+    /// Doubts about the values, as of the keys of a scenario.
     pub fn doubts(&self) -> Vec<String> {
         let schema = SoilParameters::schema();
         let of = |(option, key, value): (&str, &str, Option<f64>)| {

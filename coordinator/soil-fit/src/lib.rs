@@ -35,7 +35,7 @@ pub const LABORATORY_GRAVITY: f64 = 9.81;
 /// z_r of the bearing law, m.
 pub const REFERENCE_DEPTH: f64 = 0.1;
 
-/// What is known of the soil beside the plate tests.
+/// Parameters of the soil that are known beside the plate tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Known {
     /// Cohesion, Pa; `Some(0)`: none.
@@ -57,7 +57,7 @@ pub struct Fitted {
     pub value: f64,
     /// 95 % confidence.
     pub interval: Interval,
-    /// What it is.
+    /// Its help text.
     pub help: &'static str,
 }
 
@@ -70,7 +70,7 @@ pub struct SoilFit {
     pub fit: Fit,
     /// Parameters.
     pub parameters: Vec<Fitted>,
-    /// What was known before.
+    /// Known parameters.
     pub known: Known,
 }
 
@@ -111,7 +111,7 @@ pub fn fit_law(name: &'static str, tests: &PlateTests, known: Known) -> Result<S
     Ok(SoilFit { law: name, fit, parameters, known })
 }
 
-/// What readings from which nothing can be found lack.
+/// Error about readings from which nothing can be found, with the way out.
 fn refused(error: FitError) -> Box<InputError> {
     let help = match error {
         FitError::Falls => {

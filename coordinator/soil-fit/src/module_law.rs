@@ -15,11 +15,11 @@ use terraglue_subsystem::{NodeLaw, Parameter};
 pub struct LawNumber {
     /// Its name in the schema.
     pub name: String,
-    /// What it is.
+    /// Its help text.
     pub help: String,
     /// Value.
     pub value: f64,
-    /// 95 % confidence, NaN: unknown; None: it was given, or plates do not tell it.
+    /// 95 % confidence, NaN: unknown; None: it was given, or plates do not identify it.
     pub interval: Option<Interval>,
 }
 
@@ -33,7 +33,7 @@ pub struct LawFit {
     pub numbers: Vec<LawNumber>,
     /// Root of the mean square of ln(p/p_measured).
     pub rms: f64,
-    /// What the intervals rest on.
+    /// Basis of the intervals.
     pub basis: Basis,
     law: Arc<dyn NodeLaw>,
 }

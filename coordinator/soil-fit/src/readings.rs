@@ -21,7 +21,7 @@ pub struct PlateTests {
 }
 
 impl PlateTests {
-    /// What makes the unit of a column doubtful; None: nothing.
+    /// Doubt about the unit of a column; None: there is none.
     pub fn doubt(&self) -> Option<String> {
         let largest = |of: fn(&Reading) -> f64| self.readings.iter().map(of).fold(0.0, f64::max);
         let [sinkages, pressures] = &self.columns;
@@ -46,13 +46,13 @@ const SIZE: Names = &[
     ("plate_width_m", 1.0),
     ("plate_width_mm", 1e-3),
 ];
-/// What is measured along a curve: equal cells in all other columns make one curve.
+/// Quantities measured along a curve: equal cells in all other columns make one curve.
 const MEASURED: [&str; 4] = ["sinkage_", "pressure_", "force_", "time_"];
 
 /// Reads a file; rows whose sinkage is below `from` (m) are left out.
 ///
 /// # Errors
-/// What is wrong, with file and line.
+/// A malformed file, with the line.
 pub fn read(path: &Path, from: f64) -> Result<PlateTests, Box<InputError>> {
     let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
     parse(&text, from)

@@ -11,7 +11,7 @@ use terraglue_soil_identification::{
 /// Reads `radius=0.058,width=0.05,load=25`, in m and N; the load may be left out.
 ///
 /// # Errors
-/// What is wrong, with the form that is right.
+/// A malformed text, with the right form.
 pub fn parse_wheel(text: &str) -> Result<Wheel, String> {
     let form = "write radius=M,width=M or radius=M,width=M,load=N";
     let mut found = [None; 3];
@@ -36,7 +36,7 @@ pub fn parse_wheel(text: &str) -> Result<Wheel, String> {
 pub struct WheelTests {
     /// In the order of the file.
     pub points: Vec<WheelPoint>,
-    /// Rows left out because the wheel is braked: slip sinkage knows driven wheels only.
+    /// Rows left out because the wheel is braked: slip sinkage is defined for driven wheels only.
     pub braked: usize,
 }
 
@@ -49,7 +49,7 @@ const ROLLS: f64 = -0.01;
 /// Reads measurements of a wheel.
 ///
 /// # Errors
-/// What is wrong, with file and line.
+/// A malformed file, with the line.
 pub fn read_wheel(path: &Path, wheel: &Wheel) -> Result<WheelTests, Box<InputError>> {
     let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
     parse(&text, wheel)
@@ -101,7 +101,7 @@ fn parse(text: &str, wheel: &Wheel) -> Result<WheelTests, super::columns::Wrong>
 pub struct WheelFit {
     /// The fit.
     pub fit: identification::WheelFit,
-    /// What was known before.
+    /// Known parameters.
     pub known: Known,
 }
 
@@ -127,7 +127,7 @@ pub fn fit_wheel(
 }
 
 impl WheelFit {
-    /// What of the soil the wheel does not tell, as keys of a scenario with what they are.
+    /// Parameters of the soil that the wheel does not identify: keys of a scenario with values and descriptions.
     pub fn others(&self) -> [(&'static str, Option<f64>, &'static str); 3] {
         let known = &self.known;
         [

@@ -4,7 +4,7 @@ use super::{Known, LawFit, PlateTests, SoilFit};
 use serde_json::{Value, json as value};
 use terraglue_soil_identification::{Basis, Interval};
 
-/// Significant digits of what is written: more than any plate test knows.
+/// Rounds to the significant digits of the output: more than any plate test resolves.
 pub(super) fn digits(x: f64) -> String {
     if x == 0.0 {
         return "0.0".into();
@@ -129,7 +129,7 @@ pub fn rests(rms: f64, basis: Basis) -> String {
 }
 
 /// A law that is a module with its numbers, as lines for the table of a soil in a scenario. Numbers that plates do not
-/// tell are left to the soil and to their defaults.
+/// identify are left to the soil and to their defaults.
 pub fn law_toml(fit: &LawFit, source: &str) -> String {
     let mut text = format!(
         "# {source}\n# {}\n# Into a scenario, below its soil:\n\n[soil.law]\nplugin = {:?}\n[soil.law.parameters]\n",
@@ -156,7 +156,7 @@ pub(super) fn number_json(number: f64, interval: Option<Interval>) -> Value {
     value!({ "value": number, "low": end(|i| i.low), "high": end(|i| i.high) })
 }
 
-/// What the JSON of every fit holds.
+/// The JSON that all fits share.
 fn fit_json(
     law: &str,
     rms: f64,

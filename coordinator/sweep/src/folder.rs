@@ -14,12 +14,12 @@ pub const CASES: &str = "cases.tsv";
 pub const RESULTS: &str = "sweep.csv";
 /// The page of all results.
 pub const PAGE: &str = "sweep.html";
-/// What every case has.
+/// Name of the file of [`Settings`].
 const SETTINGS: &str = "sweep.json";
 /// Title of the first column.
 const NUMBER: &str = "case";
 
-/// What all cases have.
+/// Settings shared by all cases.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The scenario, from the folder of the sweep or absolute.
@@ -45,7 +45,7 @@ pub struct Case {
 #[derive(Clone, Debug)]
 pub struct Sweep {
     folder: PathBuf,
-    /// What all cases have.
+    /// Settings shared by all cases.
     pub settings: Settings,
     /// Varied keys.
     pub keys: Vec<String>,

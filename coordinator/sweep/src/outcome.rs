@@ -1,4 +1,4 @@
-//! What a case leaves behind: how it ended, and its figures.
+//! Outcome of a case: how it ended, and its figures.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -100,7 +100,7 @@ pub fn keys(summary: &Summary) -> Vec<String> {
     flat(summary).into_iter().filter(|(_, value)| is_number(value)).map(|(key, _)| key).collect()
 }
 
-/// What does not depend on the machine, without inner tables.
+/// Figures that do not depend on the machine, without inner tables.
 fn flat(summary: &Summary) -> Vec<(String, Value)> {
     let mut all = Vec::new();
     if let (Ok(Value::Object(table)), Ok(times)) =

@@ -17,7 +17,7 @@ const MARGIN: f64 = 75.0;
 /// The place of a case on an axis.
 type Place = Box<dyn Fn(&Row) -> Option<f64>>;
 
-/// What an axis shows.
+/// An axis and its values.
 struct Axis {
     title: String,
     /// Words from below to above, where its values are no numbers.
@@ -136,7 +136,7 @@ fn draw(out: &mut String, axis: &Axis, x: f64) {
     }
 }
 
-/// The end of a long name: it tells more than its beginning.
+/// The end of a long name: it is more informative than the beginning.
 fn short(title: &str) -> &str {
     const MOST: usize = 22;
     let from = title.char_indices().rev().nth(MOST - 1).map_or(0, |(k, _)| k);

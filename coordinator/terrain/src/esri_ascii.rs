@@ -6,7 +6,7 @@ use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_scenario::InputError;
 
-/// Reads a grid. Values that stand for missing data become `fill` (m). `spacing` (m): that of the ground made of it, where one is.
+/// Reads a grid. Values that mark missing data become `fill` (m). `spacing` (m): that of the ground made of it, where one is.
 ///
 /// # Errors
 /// [`Error::File`] when it cannot be read; [`Error::Input`] with file and line when it is not a whole grid,

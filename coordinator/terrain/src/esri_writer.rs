@@ -64,7 +64,7 @@ fn write_row(out: &mut impl Write, info: &FieldInfo, tiles: &[FieldTile], j: u32
 
 /// A height to [`DECIMALS`] decimals, by whole numbers: the exact way of `fmt` takes ten times as long. No zero is negative.
 fn write_height(out: &mut impl Write, value: f64) -> std::io::Result<()> {
-    /// Above this fewer decimals are exact, and `fmt` says what they are.
+    /// Above this fewer decimals are exact, and `fmt` finds them.
     const LARGEST: f64 = 1e14;
     let count = (value * PER_METRE).round();
     if !(count.abs() <= LARGEST) {

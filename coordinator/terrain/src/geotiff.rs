@@ -20,7 +20,7 @@ const GEOGRAPHIC: u16 = 2;
 
 const CURE: &str = "write it again as one band, e.g. with gdal_translate -b 1 -ot Float32";
 
-/// Reads the first image. Values that stand for missing data become `fill` (m). `spacing` (m): that of the ground made of it,
+/// Reads the first image. Values that mark missing data become `fill` (m). `spacing` (m): that of the ground made of it,
 /// where one is.
 ///
 /// # Errors
@@ -54,7 +54,7 @@ pub fn read_geotiff(path: &Path, fill: Option<f64>, spacing: Option<f64>) -> Res
     Ok(Raster { size: [width as usize, height as usize], step, corner: corner(&tie, step, height), heights })
 }
 
-/// What is wrong with a file, in words: those of the decoder show its own data structures.
+/// Description of a defect of a file: the decoder's own messages show its data structures.
 fn fault(error: &TiffError) -> String {
     match error {
         TiffError::FormatError(

@@ -47,7 +47,7 @@ impl Labels {
         Ok(Self { raster })
     }
 
-    /// A label that `known` does not hold, and where it stands first.
+    /// A label that is not `known`, and its first place.
     pub fn unknown(&self, known: impl Fn(u8) -> bool) -> Option<(u8, String)> {
         let labels = self.raster.heights.iter().map(|v| *v as u8).enumerate();
         let (k, label) = labels.into_iter().find(|(_, label)| *label != NO_LABEL && !known(*label))?;

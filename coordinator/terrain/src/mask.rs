@@ -10,7 +10,7 @@ use terraglue_subsystem::{Config, Terrain};
 /// The parameters with what a module needs of the mask; unchanged where there is none.
 ///
 /// # Errors
-/// A mask without ground, a file that cannot be read, a label that no row stands for.
+/// A mask without ground, a file that cannot be read, a label without a row.
 pub fn resolve(
     scenario: &Scenario,
     spec: &SubsystemSpec,

@@ -56,7 +56,7 @@ pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>, spacing: Option<f6
     Ok(Raster { size: [width, height], step: [greys.pixel_m; 2], corner: [0.0; 2], heights })
 }
 
-/// What is wrong with an image, in words: those of the decoder show its own data structures.
+/// Description of a defect of an image: the decoder's own messages show its data structures.
 fn fault(error: &DecodingError) -> String {
     match error {
         DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => "it is cut off".into(),

@@ -5,7 +5,7 @@ use super::lattice_of;
 use terraglue_diagnostics::error::Result;
 use terraglue_scenario::InputError;
 
-/// What an elevation file holds, rows from the smallest y.
+/// Content of an elevation file, rows from the smallest y.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
     /// Number of points along x and y.

@@ -99,7 +99,7 @@ fn a_crater_keeps_depth_rim_and_slope() {
         message.contains("max_slope_rad above 0.3218") && message.contains("depth_m below 0.4019"),
         "{message}"
     );
-    // What the message advises is accepted.
+    // The values that the message advises are accepted.
     assert!(
         Profile::new(3.0, 0.5, 0.1, 0.3219).is_ok() && Profile::new(3.0, 0.4019, 0.1, max_slope_rad).is_ok()
     );

@@ -134,7 +134,7 @@ impl WorldModel {
         });
     }
 
-    /// What is told of the nearest thing.
+    /// The hit that is reported for the nearest object.
     fn hit(&self, line: &Line, share: f64, nearest: &Nearest) -> RayHit {
         let t = nearest.distance;
         let (shape, outward) = match nearest.what {

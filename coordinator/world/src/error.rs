@@ -1,4 +1,4 @@
-//! What cannot be seen.
+//! Errors of scenes and grounds that cannot become part of a world.
 
 /// A scene or a ground that cannot become part of a world.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,7 +11,7 @@ pub enum Error {
         subsystem: String,
         /// Name of the shape.
         shape: String,
-        /// What is wrong with it.
+        /// Description of the problem.
         why: &'static str,
     },
     /// States or flags that are not one for each body.

@@ -100,7 +100,7 @@ impl Fixed {
         });
     }
 
-    /// Offers what a line meets, which stands before what `offer` answers.
+    /// Offers intersections of a line; shapes in boxes farther away than the last answer of `offer` are skipped.
     #[inline(always)]
     pub fn cast(&self, line: &Line, best: f64, stack: &mut Stack, mut offer: impl FnMut(f64, Met) -> f64) {
         let sheared = Sheared::new(line);

@@ -1,9 +1,9 @@
-//! What can be seen: rays, heights and overlaps among the shapes and grounds of all subsystems.
+//! Geometric queries on the world: rays, heights and overlaps among the shapes and grounds of all subsystems.
 //!
 //! [`WorldModel`] is what the host offers to a subsystem that sees ([`terraglue_subsystem::World`]). [`WorldBuilder`] takes scenes and
 //! states; after that every step is one [`WorldModel::update`], which costs nothing for bodies that are fixed.
 //!
-//! # What is exact and what is not
+//! # Accuracy
 //! * Shapes with a closed form, triangles and grounds are met in double precision; only the boxes around them are in single
 //!   precision, grown by more than it can lose. A hit does not depend on them.
 //! * A body moves within a step on a straight line and turns at a constant rate about one axis; each ray meets it where it
@@ -12,7 +12,7 @@
 //!   are seen as soon as the field shows them.
 //! * Of hits at the same distance the one with the first name of its subsystem counts, then the lowest id of the shape. Nothing
 //!   depends on the order in which subsystems are added, or on threads.
-//! * What is not a number is not seen: a body at such a pose, a node with such a height.
+//! * A body whose pose is not a number, or a node with such a height, is not seen.
 //!
 //! Surfaces are seen from both sides. A ray that starts inside a shape meets it from within.
 

@@ -67,7 +67,7 @@ impl WorldModel {
         Update { world: self }
     }
 
-    /// Whether a subsystem has bodies that are not fixed; the states of one without need not be told.
+    /// Whether a subsystem has bodies that are not fixed; the states of one without need not be given.
     pub fn moves(&self, subsystem: u32) -> bool {
         self.member(subsystem).is_ok_and(|member| !self.movable_of(&member.bodies).is_empty())
     }
@@ -103,10 +103,10 @@ impl WorldModel {
     }
 }
 
-/// What grounds are made of.
+/// Material of grounds.
 pub(crate) const GROUND_MATERIAL: Material = Material::of(terraglue_subsystem::MaterialClass::SOIL, 0.5);
 
-/// What a step changes.
+/// Changes of a step to the world.
 pub struct Update<'a> {
     world: &'a mut WorldModel,
 }

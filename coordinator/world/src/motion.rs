@@ -3,7 +3,7 @@
 //!
 //! Against the true motion this errs by a·h²/8 (a: acceleration), 1.3 µm at 10 m/s² and 1 ms. A cubic through the velocities
 //! at both ends would be nearer where they are the rates of the positions, and far off where they are not: after an impact, with
-//! a subsystem that steps every n-th communication point, or one that tells no velocities.
+//! a subsystem that steps every n-th communication point, or one that gives no velocities.
 
 use crate::bounds::Bounds;
 use terraglue_ground::Rotation;
@@ -69,7 +69,7 @@ impl Motion {
         product(unit(self.before.world_from_body.orientation), turn)
     }
 
-    /// Pose and twist at a share of the step, 0 … 1; at its ends the states that were told.
+    /// Pose and twist at a share of the step, 0 … 1; at its ends the states that were given.
     pub fn state(&self, share: f64) -> BodyState {
         if share <= 0.0 || share >= 1.0 || !self.moves {
             return if share <= 0.0 { self.before } else { self.after };

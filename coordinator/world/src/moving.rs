@@ -9,7 +9,7 @@ use crate::tree::{Care, Line, Stack, Tree, Workshop};
 use std::sync::Arc;
 use terraglue_ground::Rotation;
 
-/// What a shape looks like.
+/// Geometry of a shape.
 #[derive(Clone, Debug)]
 pub(crate) enum Form {
     Primitive(Primitive),
@@ -62,8 +62,8 @@ impl Moving {
         self.tree.build(&self.boxes, Care::Moving, &mut self.workshop);
     }
 
-    /// Offers what a line meets at a share of the step, which stands before what `offer` answers: the distance, the number
-    /// of the shape here, and that of the triangle.
+    /// Offers intersections of a line at a share of the step: distance, number of the shape here, number of the triangle.
+    /// Shapes in boxes farther away than the last answer of `offer` are skipped.
     #[inline(always)]
     pub fn cast(
         &self,

@@ -125,7 +125,7 @@ impl Way {
 #[derive(Debug, Default)]
 pub(crate) struct Stack(Vec<u64>);
 
-/// What a tree is built with, used again by every building.
+/// Buffers for building a tree, reused by every build.
 pub(crate) struct Workshop {
     builder: PlocBuilder,
     binary: Bvh2,

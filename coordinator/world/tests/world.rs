@@ -1,4 +1,4 @@
-//! What a world promises apart from the right hit: times, masks, hidden shapes, ties, threads, grounds, and that nothing is too odd for it.
+//! Properties of a world apart from the right hit: times, masks, hidden shapes, ties, threads, grounds and odd input.
 
 use random_scenes::{Heights, Random, STEP, drawn, lend, rays, scenes};
 use std::sync::Arc;

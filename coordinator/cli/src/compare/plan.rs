@@ -24,7 +24,7 @@ pub const REFUSED: &str = "refused: ";
 
 /// One row before it ran.
 pub struct Plan {
-    /// What is known of it.
+    /// Its row of the comparison.
     pub row: CompareRow,
     /// That of the row.
     pub name: String,
@@ -55,7 +55,7 @@ impl Plan {
     }
 }
 
-/// What is combined.
+/// Values that are combined.
 struct Wanted {
     strategies: Vec<String>,
     soils: Vec<String>,
@@ -247,7 +247,7 @@ fn planned(
     let loaded = Scenario::load_by(&arguments.run.scenario.scenario, &sets, &options);
     let (scenario, refused) = match loaded {
         Ok(scenario) => (scenario, None),
-        // it does not run, so that any scenario may stand here
+        // it does not run, so that any scenario will do
         Err(error) if !row.varied.is_empty() => (base.clone(), Some(error.into())),
         Err(error) => return Err(error.into()),
     };
@@ -297,7 +297,7 @@ fn is_wrong(plan: &Plan, all: &[Plan]) -> bool {
     plan.is_wrong || points || !a.varied.is_empty() && runs_otherwise()
 }
 
-/// What the table says of a row that cannot run.
+/// Text of the table for a row that cannot run.
 pub fn reason(error: &Error) -> String {
     format!("{REFUSED}{}", in_one_line(error))
 }

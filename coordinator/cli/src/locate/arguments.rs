@@ -38,7 +38,7 @@ pub struct LocateArguments {
 }
 
 impl LocateArguments {
-    /// What is known before.
+    /// The prior of the pose.
     pub fn prior(&self) -> Option<Prior> {
         let [x, y, radius] = self.prior?;
         Some(Prior { place: [x, y], radius, yaw: self.yaw.map(|y| y.map(f64::to_radians)) })

@@ -10,8 +10,8 @@ const AT_ONCE: u64 = 100_000;
 /// Points that are read from a file at most.
 const MOST_POINTS: u64 = 200_000_000;
 
-/// The points of a file that a scanner at a place saw; where nobody says where, at the origin if points lie around it, else at places
-/// that nobody knows.
+/// The points of a file that a scanner at a place saw; where no place is given, at the origin if points lie around it, else
+/// at unknown places.
 pub fn read(path: &Path, eye: Option<[f64; 3]>) -> Result<Scan> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let points = match ending.as_deref() {

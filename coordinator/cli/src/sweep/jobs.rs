@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_sweep::{Case, CaseStatus, Claim, Outcome, Sweep};
 
-/// Bytes that are kept of what a case says.
+/// Bytes that are kept of the output of a case.
 const MOST_SAID: u64 = 1 << 18;
 
 /// Runs what is missing, then collects.

@@ -15,7 +15,7 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -
     Test { name, area: Area::Library, level: Level::Quick, kinds: &[], after, promise, run }
 }
 
-/// What is looked at before an instance takes its first step: what a changed mode does to its numbers is the same finding.
+/// Tests before an instance takes its first step: the effect of a changed mode on its numbers is the same finding.
 pub const AT_LOADING: &[Test] = {
     let promise = "loading leaves rounding, denormal numbers and traps as they were";
     &[Test { after: &["loads"], ..test("host-loading", promise, floating_point_loading) }]
@@ -88,7 +88,7 @@ fn floating_point(context: &TestContext) -> Verdict {
     untouched(context, "the floating-point mode", |p| p.floating_point.clone())
 }
 
-/// What was printed is seen by the process that watches this one.
+/// The process that watches this one sees its output.
 fn output(context: &TestContext) -> Verdict {
     let (_, instance) = script(context.instance()?, 60, 0)?;
     drop(instance);

@@ -1,5 +1,5 @@
-//! What a law of its own promises, straight from its functions: values, slopes, arrays, state. The tests of a soil come on
-//! top of these, with the law in the soil that comes with the program.
+//! Tests of the functions of a law that is a module: values, slopes, arrays, state. The tests of a soil come on top of
+//! these, with the law in the soil that comes with the program.
 
 use super::values::not_told;
 use crate::definition::Test;

@@ -1,4 +1,4 @@
-//! What the file is: symbols, table, description, schema.
+//! Tests of the file: symbols, table, description, schema.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};

@@ -160,7 +160,7 @@ fn wrong_config(context: &TestContext) -> Verdict {
     let needs_any = module.schema().parameters.iter().any(|p| p.default.is_null() && !p.optional);
     let mut odd = vec![];
     for p in module.schema().parameters.iter().filter(|p| !p.name.contains(['.', '*'])) {
-        // What the host refuses before the module sees it is not the module's business; these reach it.
+        // Parameters that the host refuses do not reach the module; these do.
         odd.push(format!("{{\"{}\": []}}", p.name));
     }
     if needs_any {

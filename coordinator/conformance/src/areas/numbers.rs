@@ -192,7 +192,7 @@ fn extremes_robot(context: &TestContext) -> Verdict {
             fixture.try_force(&[size, 0.1 * size, -0.3 * size], h)?;
         }
     }
-    // joints may be torn by what no robot bears, if the robot says so
+    // joints may be torn by forces that no robot withstands, if the robot says so
     for size in [1e7, -1e7] {
         match fixture.try_force(&[size, 0.1 * size, -0.3 * size], 1e-3) {
             Err(Stop::Fail(refused)) if refused.expected == ANSWER => {}

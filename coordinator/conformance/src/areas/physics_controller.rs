@@ -1,4 +1,4 @@
-//! What a controller obeys: it is a function of time and inputs, not of how often it is called.
+//! Tests of controllers: they are functions of time and inputs, not of how often they are called.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};

@@ -1,4 +1,4 @@
-//! What bodies obey: momentum, gravity, action and reaction, the rigid estimate.
+//! Physics of bodies: momentum, gravity, action and reaction, the rigid estimate.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};

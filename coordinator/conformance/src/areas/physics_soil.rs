@@ -1,4 +1,4 @@
-//! What every ground obeys, whatever its law: energy is not made, it pushes and never pulls, friction opposes.
+//! Physics of every ground, whatever its law: energy is not made, it pushes and never pulls, friction opposes.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
@@ -72,7 +72,7 @@ impl Work {
         for ((before, after), v) in self.before.iter().zip(&fixture.moved).zip(velocities) {
             let work = -0.5 * h * (dot(before.force, *v) + dot(after.force, *v));
             // Where a foot lifts off within the step, it gives out between nothing and this much: a straight line through
-            // the corner says too much, of a spring up to an eighth of its stiffness times the step squared.
+            // the corner overestimates it, for a spring by up to an eighth of its stiffness times the step squared.
             let lifts = before.normal > 0.0 && after.normal <= 0.0 && work < 0.0;
             self.sum += if lifts { 0.0 } else { work };
             self.turned += work.abs();
@@ -213,8 +213,8 @@ fn shear_cycles(context: &TestContext) -> Verdict {
     Ok(())
 }
 
-/// What a foot meets on the mean that is pressed 8 mm deep and dragged by 6 cm along the unit vector `d`, the ground
-/// without cohesion.
+/// Mean forces on a foot that is pressed 8 mm deep and dragged by 6 cm along the unit vector `d`, the ground without
+/// cohesion.
 pub fn dragged(context: &TestContext, foot: Foot, ground: Flat, d: [f64; 2]) -> Verdict<Moved> {
     let module = context.module()?;
     let soil = context.instance_with(&module, ground, &[("c_pa", 0.0), ("cohesion_pa", 0.0)])?;
@@ -252,7 +252,7 @@ fn opposes(context: &TestContext) -> Verdict {
 }
 
 fn friction_bound(context: &TestContext) -> Verdict {
-    // A plate: what stands in the way of a round foot is pushed aside, and that is no friction.
+    // A plate: a round foot pushes soil in its way aside, and that is no friction.
     for d in [[1.0, 0.0], [0.0, -1.0]] {
         let m = dragged(context, Foot::plate(0.0, 0.0), Flat::LEVEL, d)?;
         if m.mu.is_finite() && m.tangential > 1.01 * m.mu * m.normal + 1e-9 {

@@ -49,7 +49,7 @@ pub const TESTS: &[Test] = {
     ]
 };
 
-/// What is not known of a module in Python.
+/// Reason to skip for a module in Python.
 const MEMORY: &str = "its memory is not watched";
 
 /// The same way again and again: nothing new appears after the first two rounds.
@@ -121,7 +121,7 @@ fn leak_instances(context: &TestContext) -> Verdict {
 }
 
 /// Bytes by which the heap grows in every round after the first. The allocator keeps some of what is freed in lists of
-/// its own, so one round says little: the smallest growth of three counts.
+/// its own, so one round proves little: the smallest growth of three counts.
 fn growth(mut round: impl FnMut() -> Verdict<Option<usize>>) -> Verdict<usize> {
     let mut sizes = Vec::new();
     for _ in 0..4 {

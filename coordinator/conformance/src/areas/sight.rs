@@ -1,5 +1,5 @@
-//! What a sensor obeys: what it shows follows from what it saw, it asks for no time to come, keeps nothing of the world, and its
-//! streams keep to what they tell.
+//! Tests of sensors: outputs follow from observations, no time to come is asked for, nothing of the world is kept, and
+//! streams keep to their declaration.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
@@ -154,7 +154,7 @@ fn no_future(context: &TestContext) -> Verdict {
     Ok(())
 }
 
-/// The world that a module has kept says that it is closed, and the call after it tells of the question.
+/// A world that a module has kept answers that it is closed, and the next call reports the question.
 fn keeps_nothing(context: &TestContext) -> Verdict {
     let mut instance = seeing(context)?;
     for index in 0..10 {

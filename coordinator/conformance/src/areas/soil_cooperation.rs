@@ -1,4 +1,4 @@
-//! What gluing relies on: force and motion answer each other, the estimate is respected, the ledgers are true.
+//! Properties on which gluing relies: force and motion answer each other, the estimate is respected, the ledgers are true.
 
 use crate::definition::Test;
 use crate::finding::{Stop, Verdict};
@@ -38,7 +38,7 @@ fn surface(context: &TestContext) -> Verdict {
     fixture.meet(&[[0.0, 0.0, -1.0]], 1e-3)?;
     let Some(n) = fixture.normal_components().first().copied() else { return Ok(()) };
     let gap = fixture.now.x[n];
-    // A ground on a lattice knows its height between nodes only so well.
+    // A ground on a lattice has its height between nodes only to this accuracy.
     if (gap + 4e-4).abs() > 1e-5 {
         let got = format!("x = {gap:e} m along n");
         return Err(Stop::fail(

@@ -70,9 +70,9 @@ const WAYS: [Way; 3] = [
     },
 ];
 
-/// What a step shows.
+/// Work and energies up to a step.
 struct Shown {
-    /// What happens.
+    /// The motion in this step, in words.
     given: String,
     /// Whether it is the first of a soil.
     first: bool,

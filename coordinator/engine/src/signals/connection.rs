@@ -74,7 +74,7 @@ impl Link {
     /// Goes on along the line of the values, where there is one.
     ///
     /// # Errors
-    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the source cannot tell a derivative that it has promised.
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the source cannot give a derivative that it has promised.
     #[inline]
     pub fn extrapolate(&mut self, moment: Moment, instances: &[Instance]) -> Result {
         let Some(line) = &mut self.extrapolation else { return Ok(()) };
@@ -90,7 +90,7 @@ impl Link {
         })
     }
 
-    /// What its inputs follow.
+    /// Extrapolation of its inputs.
     pub fn extrapolates(&self) -> Extrapolate {
         match &self.extrapolation {
             None => Extrapolate::Constant,

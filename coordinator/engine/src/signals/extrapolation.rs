@@ -1,5 +1,5 @@
 //! Inputs that follow their source beyond the last communication point (`extrapolate = "linear"`), along the line through its last two
-//! values, or along the derivative that the source tells (`extrapolate = "derivatives"`).
+//! values, or along the derivative that the source provides (`extrapolate = "derivatives"`).
 //!
 //! An input is held over a step, so a subsystem that integrates it takes the mean of the line over its step, which makes the exchange of
 //! second order. One whose outputs follow its inputs at once takes the value at the end, to which its outputs belong. Source and target may
@@ -9,7 +9,7 @@
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::{Recall, Remember};
 
-/// What an input that goes from `start` to `end` within a step is held at: the end where outputs follow inputs at once, else the mean.
+/// Held value of an input that goes from `start` to `end` in a step: the end if outputs follow inputs at once, else the mean.
 pub fn held(takes_end: bool, start: f64, end: f64) -> f64 {
     if takes_end { end } else { 0.5 * (start + end) }
 }
@@ -32,7 +32,7 @@ pub struct Extrapolation {
     multiples: [u64; 2],
     /// Whether the target takes the value at the end of its step.
     takes_end: bool,
-    /// Whether the source tells the slope; else the line runs through its last two values.
+    /// Whether the source provides the slope; else the line runs through its last two values.
     by_derivatives: bool,
     /// Time of the last values, s; NaN before the first ones.
     last_s: f64,
@@ -62,7 +62,7 @@ impl Extrapolation {
         }
     }
 
-    /// Whether the source tells its slopes.
+    /// Whether the source provides its slopes.
     pub fn by_derivatives(&self) -> bool {
         self.by_derivatives
     }
@@ -78,7 +78,7 @@ impl Extrapolation {
     /// has made a step.
     ///
     /// # Errors
-    /// What `tell` returns.
+    /// The error of `tell`.
     pub fn take(
         &mut self,
         moment: Moment,
@@ -118,7 +118,7 @@ impl Extrapolation {
         Ok(())
     }
 
-    /// What the inputs are set to; `None` before the first step.
+    /// Values for the inputs; `None` before the first step.
     pub fn ahead(&self) -> Option<&[f64]> {
         (!self.ahead.is_empty()).then_some(&self.ahead)
     }
@@ -150,7 +150,7 @@ mod tests {
         line.take(moment, &[value], |_| panic!("no slope is wanted")).expect("taken");
     }
 
-    /// What the inputs are set to at the last of some steps, of a source with the value u(t) in its own last step.
+    /// Value of the inputs at the last of some steps, of a source with the value u(t) in its own last step.
     fn ahead(multiples: [u32; 2], takes_end: bool, steps: u64, u: impl Fn(f64) -> f64) -> f64 {
         let mut line = Extrapolation::new(multiples, takes_end, false);
         let source = u64::from(multiples[0]);

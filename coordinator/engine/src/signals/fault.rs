@@ -1,4 +1,4 @@
-//! Faults of single numbers: what a subsystem is told differs from what was said.
+//! Faults of single numbers: the value that a subsystem receives differs from the one that was sent.
 //!
 //! A fault of an output changes the number on every connection that leaves it, in the unit of the output; the output
 //! itself, and its recording, stay true. A fault of an input changes what it is given: over its connection, or, where it

@@ -1,7 +1,7 @@
 //! Values that are connected at the start: passed on in the order in which they depend on each other, loops by Newton.
 //!
 //! FMUs answer with outputs that depend on inputs of the same time while they initialise. A chain is settled by
-//! passing values on until nothing changes. What still changes then is a loop: r(u) = y(u) − u = 0 over all connected
+//! passing values on until nothing changes. Values that still change form a loop: r(u) = y(u) − u = 0 over all connected
 //! inputs, Newton with the Jacobian by directional derivatives where all subsystems of a column know them, else by
 //! differences.
 

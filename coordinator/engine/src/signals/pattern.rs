@@ -1,7 +1,7 @@
 //! Name patterns of connections: `gait.*.angle_target` → `robot.*.angle_target`.
 //!
-//! A `*` matches a whole dotted part or a piece of one, never a dot and never nothing. What the stars of `from`
-//! match goes, in this order, into the stars of `to`.
+//! A `*` matches a whole dotted part or a piece of one, never a dot and never nothing. The matches of the stars of `from`
+//! replace, in this order, the stars of `to`.
 
 /// The name that `to` makes of `name`, when `name` matches `from`.
 ///

@@ -9,7 +9,7 @@ use terraglue_subsystem::{ValueType, Variable};
 /// New value by value, both as whole numbers: 0 and 1 of truth values, positions of items.
 pub type Table = BTreeMap<i128, i128>;
 
-/// Whether values of a type can stand in a table.
+/// Whether a table can hold values of a type.
 pub fn takes(value_type: ValueType) -> bool {
     use ValueType::{Binary, Clock, F32, F64, String};
     !matches!(value_type, F64 | F32 | String | Binary | Clock)

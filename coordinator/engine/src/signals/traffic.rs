@@ -53,8 +53,7 @@ impl Signals {
         Ok(())
     }
 
-    /// Outputs of t become inputs of the step, with what is wrong with them on their way; `tell` hears of faults that begin
-    /// or end.
+    /// Outputs of t become inputs of the step, with the faults on their way; `tell` is called when a fault begins or ends.
     ///
     /// # Errors
     /// As of [`Signals::read`] and [`Signals::write`], or an input that does not take what a fault makes of it.

@@ -121,7 +121,7 @@ impl Testbed {
     }
 }
 
-/// Warns of what a scenario says in vain or hardly means.
+/// Warns of keys without effect and of doubtful values.
 fn advise(scenario: &Scenario) {
     let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
     let doubt = scenario::plausible::terrain(scenario);
@@ -396,7 +396,7 @@ fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) ->
     let help = near.or_else(|| error.is_unknown().then(|| NO_MODULE.to_owned()));
     let (source, name) = (&scenario.source, spec.name.as_str());
     match error {
-        // what a soil says of the ground that it gets is about another table
+        // an error of a soil about its ground belongs to another table
         LoadError::Refused { message, .. } | LoadError::Instantiate { message, .. }
             if message.starts_with("terrain: ") =>
         {

@@ -15,7 +15,7 @@ pub fn check_groups(scenario: &Scenario, groups: &[Group], instances: &[Instance
     check_settling(scenario, groups, instances)
 }
 
-/// FMUs know no time before their start, so none can be among what comes to rest before t = 0.
+/// FMUs have no time before their start, so none can be among the subsystems that come to rest before t = 0.
 fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
     let settle_s = scenario.time.settle_s;
     let glued = |slot: usize| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
@@ -69,7 +69,7 @@ fn check_page(scenario: &Scenario, directory: &Directory) -> Result {
     Ok(())
 }
 
-/// The names that report and page speak of must exist.
+/// The names that report and page refer to must exist.
 ///
 /// # Errors
 /// One does not.
@@ -105,7 +105,7 @@ pub fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Ins
     Ok(())
 }
 
-/// What is wrong with a joint whose points are so far apart, and the way out.
+/// Message about a joint whose points are `gap_m` apart, m, and the way out.
 pub(super) fn gap_words([a, b]: &[String; 2], gap_m: f64) -> (String, String) {
     let gap = if gap_m < 1e-3 { format!("{gap_m:.2e}") } else { format!("{gap_m:.4}") };
     let message = format!(

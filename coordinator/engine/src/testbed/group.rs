@@ -68,7 +68,7 @@ impl Group {
         Ok(self.passage.residual(&self.problem))
     }
 
-    /// The gap that the last commit left, told by the soil itself in its answer to `set_ports`.
+    /// The gap that the last commit left, reported by the soil itself in its answer to `set_ports`.
     pub fn measure_gap(&mut self) {
         let problem = &mut self.problem;
         if self.strategy.is_single_pass() {

@@ -68,7 +68,7 @@ impl Loops {
     /// The loops of a run; `state`: number of a state that nobody else keeps.
     ///
     /// # Errors
-    /// What takes part and cannot repeat a step, in words.
+    /// A subsystem that takes part and cannot repeat a step, in words.
     pub fn new(
         links: &Links,
         faults: &Faults,
@@ -126,7 +126,7 @@ impl Loops {
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
     }
 
-    /// Repeats the trials of the members until the values stand. What was not solved, if so.
+    /// Repeats the trials of the members until the values no longer change. Returns a message if a loop was not solved.
     pub fn solve(
         &mut self,
         order: &StepOrder,

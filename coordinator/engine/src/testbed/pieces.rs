@@ -1,6 +1,6 @@
-//! Pieces of one link: what a scenario that cuts a robot must say of all its parts alike.
+//! Checks of the pieces of one link in a scenario that cuts a robot.
 //!
-//! A subsystem whose body is a piece of a divided link tells `BODY.link_share`, the share of the link in it. Pieces of
+//! A subsystem whose body is a piece of a divided link has `BODY.link_share`, the share of the link in it. Pieces of
 //! one name that glue of all six components welds are that link again: their shares add up to 1, and they start in one
 //! place with the same rates.
 
@@ -10,7 +10,7 @@ use terraglue_host::Instance;
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::{BodyState, ValuesMut, component};
 
-/// The variable that tells that a body is a piece of a link.
+/// The variable that marks a body as a piece of a link.
 const SHARE: &str = ".link_share";
 /// Shares and places that differ by less are equal, dimensionless, m, rad, m/s and rad/s.
 const EQUAL: f64 = 1e-9;

@@ -23,8 +23,8 @@ impl Testbed {
         self.teardown_errors.clone()
     }
 
-    /// Puts an instance in the place of the one of its name: with its state, or as it is (`afresh`). `count` says the
-    /// how-manieth of this name it is. Answers with the size of the state in bytes; None: afresh.
+    /// Puts an instance in the place of the one of its name: with its state, or as it is (`afresh`). `count`: its number
+    /// among those of this name. Answers with the size of the state in bytes; None: afresh.
     ///
     /// # Errors
     /// Why the old one stays; nothing has changed then.
@@ -111,7 +111,7 @@ fn misfit(old: &Instance, new: &Instance) -> Option<String> {
     None
 }
 
-/// A soil whose tiles bear other generations than those of the soil before it, which counted from its own start: what
+/// A soil whose tiles have other generations than those of the soil before it, which counted from its own start: what
 /// others keep of a tile is then looked at again.
 struct Renumbered {
     inner: Box<dyn Subsystem>,

@@ -26,8 +26,8 @@ impl<'a> Shown<'a> {
         Some((own, Self { model, before, behind }))
     }
 
-    /// A subsystem whose fields are shown. Those of one that sees change while the world is looked at, so what is told of
-    /// them would depend on the order.
+    /// A subsystem whose fields are shown. Those of one that sees change while the world is looked at, so their values would
+    /// depend on the order.
     fn other(&self, subsystem: u32) -> Option<&Instance> {
         let slot = subsystem as usize;
         let own = self.before.len();

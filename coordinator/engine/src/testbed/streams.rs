@@ -1,5 +1,5 @@
 //! Streams of all subsystems: the messages of a step, copied before the next one begins, within the bounds that each stream
-//! has told. What is beyond them is left out with a warning that names the stream; nothing waits.
+//! declares. Messages beyond them are omitted with a warning that names the stream; nothing waits.
 
 use crate::observer::StreamView;
 use crate::signals;
@@ -8,9 +8,9 @@ use terraglue_gluing::memory::{Recall, Remember};
 use terraglue_host::Instance;
 use terraglue_subsystem::StreamInfo;
 
-/// Most bytes of all messages of a nominal step. What is beyond it is left out.
+/// Most bytes of all messages of a nominal step. Messages beyond it are omitted.
 const MOST_BYTES: usize = 64 << 20;
-/// Messages may come nearer to each other than their rate says by this part of a period: steps do not divide it evenly.
+/// Messages may come earlier than their rate allows by this part of a period: steps do not divide it evenly.
 const EARLY: f64 = 0.5;
 
 /// All streams of a run; empty where there are none.
@@ -78,12 +78,12 @@ impl Streams {
         }
     }
 
-    /// Takes what the last communication step made; `tell` hears the number of the stream and the bytes of each message.
+    /// Takes the messages of the last communication step; `tell` gets the number of the stream and the bytes of each.
     pub fn collect(&mut self, instances: &[Instance], mut tell: impl FnMut(usize, &[u8])) -> Result {
         let all = self.views.iter_mut().zip(&self.places).zip(&mut self.state).enumerate();
         for (number, ((view, (slot, k)), state)) in all {
             let Some(message) = terraglue_host::message(&instances[*slot], *k)? else { continue };
-            // told again: the instance has made no step since
+            // the same message again: the instance has made no step since
             if state.last == Some(message.time) {
                 continue;
             }

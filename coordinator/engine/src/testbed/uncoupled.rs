@@ -47,7 +47,7 @@ impl Uncoupled {
         self.workers.threads() > 1 && self.saved.iter().all(|s| *s >= WORTH)
     }
 
-    /// (3) A trial of every subsystem without glue. What discarded the step, if any.
+    /// (3) A trial of every subsystem without glue. Returns the reason why the step was discarded, if it was.
     pub fn advance(
         &mut self,
         clock: &RunClock,
@@ -125,7 +125,7 @@ fn one_by_one(span: &Span, subsystems: &mut Subsystems) {
     }
 }
 
-/// A watch for a part of this step, and how many steps it stands for. Where bodies are glued every step is
+/// A watch for a part of this step, and how many steps it represents. Where bodies are glued every step is
 /// watched; elsewhere reading the clock would cost more than the step of a cheap FMU.
 pub(super) fn watch(clock: &RunClock, glued: bool) -> (Option<Instant>, u32) {
     if glued {

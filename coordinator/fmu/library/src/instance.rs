@@ -12,7 +12,7 @@ pub enum Logger {
     Two(unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...)),
     /// FMI 3.0.
     Three(unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char)),
-    /// The master wants to hear nothing.
+    /// The master takes no log.
     None,
 }
 
@@ -55,7 +55,7 @@ impl Log {
     }
 }
 
-/// What a handle of the master points at.
+/// The instance behind a handle of the master.
 pub struct Instance {
     pub fmu: ExportedInstance,
     pub log: Log,

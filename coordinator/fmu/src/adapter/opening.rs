@@ -1,4 +1,4 @@
-//! What an FMU is opened with, and what is said of it then.
+//! Options with which an FMU is opened, and the warnings about it.
 
 use crate::settings::Options;
 use crate::trace;
@@ -8,11 +8,11 @@ use terraglue_subsystem::{Error, Host, LogLevel, Result};
 
 /// Folder of FMUs that talk over a simulated bus.
 const BUS: &str = "extra/org.fmi-standard.fmi-ls-bus";
-/// What is not done for them.
+/// Warning about an FMU of a bus.
 const NO_BUS: &str = "it is made for a bus (FMI-LS-BUS), which is not simulated: a frame in a clocked binary variable is passed on like any value, \
                       one step late, and a countdown clock of one FMU ticks no clock of another within an event";
 
-/// What an instance is made with.
+/// Options of an instance.
 pub(super) fn of_instance(options: &Options, host: &Arc<dyn Host>) -> Result<InstanceOptions> {
     let sink = host.clone();
     let log = Box::new(move |line: &LogLine| sink.log(line.level, &line.text));
@@ -24,7 +24,7 @@ pub(super) fn of_instance(options: &Options, host: &Arc<dyn Host>) -> Result<Ins
     Ok(InstanceOptions { event_mode, log_categories, trace: trace.transpose()?, ..plain })
 }
 
-/// Tells the defects of a description; where `strict` is wanted, the first one refuses the FMU.
+/// Logs the defects of a description; where `strict` is wanted, the first one refuses the FMU.
 pub(super) fn warn(fmu: &Fmu, strict: bool, host: &dyn Host) -> Result {
     if fmu.folder().join(BUS).is_dir() {
         host.log(LogLevel::Warning, NO_BUS);

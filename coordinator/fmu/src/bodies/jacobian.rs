@@ -1,7 +1,7 @@
 //! The interface Jacobian of glued bodies from directional or adjoint derivatives of their FMU.
 //!
-//! Those speak of outputs at one time, so they give dA/d(wrench). A wrench that stays over the step makes dV = h·dA and
-//! dX = c·h²·dA of it, with c = ½ until two trials of the step say what the FMU's own integration makes of it.
+//! Those are of outputs at one time, so they give dA/d(wrench). A wrench that stays over the step makes dV = h·dA and
+//! dX = c·h²·dA of it, with c = ½ until two trials of the step show the effect of the FMU's own integration.
 
 use super::axis::Axis;
 use super::motion::Motion;
@@ -19,7 +19,7 @@ const SHARE: f64 = 0.5;
 /// Force and moment, or acceleration and angular acceleration.
 type Six = [Option<Axis>; 6];
 
-/// What is pushed, and what follows.
+/// Force and moment on a body.
 fn inputs(body: &Body) -> Six {
     join(body.force, body.moment)
 }
@@ -67,7 +67,7 @@ fn all(bodies: &[Body], of: fn(&Body) -> Six) -> (Vec<u32>, Vec<usize>) {
 }
 
 impl Bodies {
-    /// Whether derivatives can tell dA/d(wrench): every force and moment has its acceleration, none in an array.
+    /// Whether derivatives provide dA/d(wrench): every force and moment has its acceleration, none in an array.
     pub fn tell_derivatives(&self) -> bool {
         let own = |body: &Body| {
             inputs(body).iter().zip(outputs(body)).all(|(input, output)| match (input, output) {
@@ -195,7 +195,7 @@ fn component(
     let (push, row) = match c < 3 {
         true => {
             let arm = turned(turn, minus(port.origin, start.position));
-            // What is turned within the step goes on turning with the body: by half of its turn in the mean.
+            // The lever turns with the body within the step: by half of its turn in the mean.
             let mean = if level == Level::Position { half(turn) } else { IDENTITY };
             let lever = turned(conjugate(mean), cross(arm, d));
             (six(d, cross(minus(port.origin, start.loaded), d)), six(d, lever))

@@ -3,7 +3,7 @@
 //! `[x.bodies.NAME]` has lists of names along world x, y and z (`""` for none): `position`, `velocity`, `acceleration` and
 //! `force`. With `orientation`, a quaternion, the body turns, and has `angular_velocity`, `angular_acceleration` and
 //! `moment`. `terminal` is the name of a terminal of FMI 3 whose members are these. The body can then be named by
-//! `[[glue]]`. [`names`] reads the table, [`motion`] tells what a port of the body does, [`jacobian`] the Jacobian.
+//! `[[glue]]`. [`names`] reads the table, [`motion`] gives the motion of a port of the body, [`jacobian`] the Jacobian.
 
 mod axis;
 mod jacobian;
@@ -166,7 +166,7 @@ impl Bodies {
         Ok(())
     }
 
-    /// Accelerations where the body tells them, in the place of means: of a body that turns both kinds are needed.
+    /// Accelerations where the body has them, in the place of means: of a body that turns both kinds are needed.
     fn accelerate(&self, instance: &FmuInstance, b: usize, at: &mut AtPort, fail: Fail) -> Result {
         let body = &self.all[b];
         let told = [&body.acceleration, &body.angular_acceleration].map(|a| a.iter().any(Option::is_some));

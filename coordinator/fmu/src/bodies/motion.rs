@@ -11,23 +11,23 @@ use terraglue_subsystem::{Error, Port, Result};
 /// By how much the length of a quaternion may differ from 1.
 const UNIT: f64 = 1e-6;
 
-/// Motion of a body at one time, as the FMU tells it.
+/// Motion of a body at one time, as the FMU reports it.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     /// Place, m.
     pub position: Vector,
     /// World from body; of a body that only translates no rotation.
     pub orientation: Quaternion,
-    /// m/s; 0 where it is not told.
+    /// m/s; 0 where it is not given.
     pub velocity: Vector,
-    /// rad/s; 0 where it is not told.
+    /// rad/s; 0 where it is not given.
     pub angular_velocity: Vector,
     /// Where force and moment act, world, m.
     pub loaded: Vector,
 }
 
 impl Motion {
-    /// As the FMU tells it now.
+    /// As the FMU reports it now.
     ///
     /// # Errors
     /// A number that is not finite, or a quaternion that is not of unit length.
@@ -100,7 +100,7 @@ pub struct AtPort {
 }
 
 impl AtPort {
-    /// From the motions at both ends of a step of length h. Rates that the FMU does not tell are means of the step.
+    /// From the motions at both ends of a step of length h. Rates that the FMU does not provide are means of the step.
     pub fn new(body: &Body, port: &Port, before: &Motion, after: &Motion, h: f64) -> Self {
         let arm = minus(port.origin, before.position);
         let turn = product(after.orientation, conjugate(before.orientation));

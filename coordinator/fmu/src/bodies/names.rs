@@ -1,11 +1,11 @@
-//! The table of a body, `[x.bodies.NAME]`: lists of names, or a terminal of FMI 3 that stands for them.
+//! The table of a body, `[x.bodies.NAME]`: lists of names, or a terminal of FMI 3 in place of them.
 
 use super::axis::Axis;
 use serde_json::{Map, Value};
 use terraglue_numerics::rotation::Vector;
 use terraglue_subsystem::{Effect, Error, Result, ValueType, Variable};
 
-/// What a list of a body speaks of, and what the members of a terminal are called that are no array.
+/// Keys of the lists of a body, and names of the members of a terminal that are no array.
 const KEYS: [(&str, &[&str]); 9] = [
     ("position", &["x", "y", "z"]),
     ("orientation", &["qw", "qx", "qy", "qz"]),
@@ -17,7 +17,7 @@ const KEYS: [(&str, &[&str]); 9] = [
     ("moment", &["moment_x", "moment_y", "moment_z"]),
     ("force_at", &["force_at_x", "force_at_y", "force_at_z"]),
 ];
-/// Those that say nothing of a body without orientation.
+/// Those without meaning for a body without orientation.
 const OF_TURNING: [&str; 4] = ["angular_velocity", "angular_acceleration", "moment", "force_at"];
 
 /// Numbers along world x, y and z.
@@ -28,7 +28,7 @@ pub type Axes = [Option<Axis>; 3];
 pub enum Point {
     /// As the scenario says.
     Given(Vector),
-    /// As the FMU tells.
+    /// As the FMU reports it.
     Told(Axes),
 }
 
@@ -68,7 +68,7 @@ pub fn terminals(description: &terraglue_fmi::ModelDescription) -> Terminals {
     description.terminals.iter().map(|t| (t.name.clone(), names(t))).collect()
 }
 
-/// What is wrong with a body of a scenario.
+/// Error about a body of a scenario.
 pub fn wrong(body: &str, text: &str) -> Error {
     Error::Refused(format!("body `{body}` of the FMU: {text}"))
 }
@@ -119,8 +119,8 @@ impl<ValueLocation: Fn(u32) -> Option<Axis>> Lookup<'_, ValueLocation> {
         Ok(body)
     }
 
-    /// Names of the variables of a terminal, as the lists that stand for it. Other members are left alone, and so are
-    /// those that speak of turning where no orientation is told.
+    /// Names of the variables of a terminal, as the lists that replace it. Other members are ignored, and so are those of
+    /// rotation where there is no orientation.
     fn members(&self, body: &str, terminal: &Value) -> Result<Map<String, Value>> {
         let name = terminal.as_str().ok_or_else(|| wrong(body, "`terminal` takes a name in quotes"))?;
         let Some((_, members)) = self.terminals.iter().find(|(n, _)| n == name) else {

@@ -1,6 +1,6 @@
-//! The module `feet`: shapes that go where they are told and say which forces meet them.
+//! The module `feet`: shapes that follow given poses and report the forces on them.
 //!
-//! It stands for a robot that lives elsewhere: in an exported soil the poses come from another program, in a scenario
+//! It replaces a robot that is simulated elsewhere: in an exported soil the poses come from another program, in a scenario
 //! from a connection. No force moves it, so G = dX/dT = 0, and the force of a soil's law at its motion is the answer.
 
 mod motion;
@@ -49,7 +49,7 @@ impl Module for DrivenBodiesModule {
     }
 }
 
-/// What changes.
+/// State of the module.
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub feet: Vec<DrivenBody>,
@@ -99,7 +99,7 @@ impl Subsystem for DrivenBodies {
         self.move_ports(step, out.x_free, None);
         out.g.fill(0.0);
         out.t_star.fill(0.0);
-        // nothing but the soil's law bounds the force on what goes, or stands, where it is told
+        // nothing but the soil's law bounds the force on a foot that follows, or keeps, a given pose
         out.active.fill(1);
         for port in step.ports {
             for (i, c) in port.components() {

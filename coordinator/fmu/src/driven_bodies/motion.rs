@@ -80,7 +80,7 @@ impl DrivenBody {
         [std::array::from_fn(|k| v[k] + swing[k]), w]
     }
 
-    /// Adds a wrench (N, N m) that acts at `origin`, to be told about the foot's place after h seconds.
+    /// Adds a wrench (N, N m) that acts at `origin`, to be reported about the foot's place after h seconds.
     pub fn load(&mut self, h: f64, origin: Vector, force: Vector, moment: Vector) {
         let lever = cross(minus(origin, self.pose_after(h).position), force);
         for k in 0..3 {

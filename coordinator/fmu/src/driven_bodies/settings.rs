@@ -5,7 +5,7 @@ use terraglue_subsystem::{Config, Error, Geometry, Kind, Parameter, ParameterTyp
 
 /// Where a foot is that nobody has placed: far above the ground, m.
 const UP_M: f64 = 100.0;
-/// Smallest and largest lengths of a foot, m: a grain of sand, and what no machine stands on.
+/// Smallest and largest lengths of a foot, m: a grain of sand, and more than any machine needs.
 const LENGTHS_M: [f64; 2] = [1e-4, 100.0];
 /// Most feet of one instance.
 const MOST: f64 = 1024.0;
@@ -18,7 +18,7 @@ pub struct DrivenBodiesSettings {
     pub duration_s: f64,
 }
 
-/// What the module is.
+/// Schema of the module.
 pub fn schema() -> Schema {
     let [low, high] = LENGTHS_M;
     let number = |name: &str, default: f64, help: &str| {

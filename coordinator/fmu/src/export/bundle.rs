@@ -18,7 +18,7 @@ use terraglue_scenario::{InputError, Scenario, SubsystemSpec, find_soil_table};
 use terraglue_subsystem::{Capabilities, Config, ParameterType};
 use toml_edit::{DocumentMut, Item, value};
 
-/// What was written.
+/// An FMU that was written.
 #[derive(Clone, Debug)]
 pub struct Exported {
     /// The FMU.
@@ -65,7 +65,7 @@ pub fn write(request: &Request) -> Result<Exported> {
     };
     let json = serde_json::to_vec_pretty(&settings).map_err(|e| plain(e.to_string()))?;
     place(&resources, SETTINGS, &json).map_err(plain)?;
-    // What is described is what the FMU itself will open.
+    // The description is made from the instance that the FMU itself will open.
     let opening = Opening { name: "export".into(), resources: resources.clone(), log: Mailbox::default() };
     let opened = open(&opening).map_err(|message| at_home(&scenario, request, bare, message))?;
     let about = about(request, &scenario, &settings);
@@ -121,7 +121,7 @@ fn touching(scenario: &Scenario) -> Result<Vec<[f64; 3]>> {
     Ok(given.as_chunks::<3>().0.iter().map(|[x, y, _]| [*x, *y, height]).collect())
 }
 
-/// What is wrong with a scenario, at its place where it was written and not in the copy. The scenario around a single module is no
+/// Error of a scenario, at its place in the original and not in the copy. The scenario around a single module is no
 /// file: only edits of it have a place.
 fn at_home(scenario: &Scenario, request: &Request, bare: Option<&str>, message: String) -> Error {
     let options = Options { module_paths: request.module_paths.clone(), ..Options::default() };
@@ -138,7 +138,7 @@ fn plain(message: impl Into<String>) -> Error {
     InputError::plain(message, None).into()
 }
 
-/// The scenario, and the subsystem whose variables bear no prefix where it stands for one module.
+/// The scenario, and the subsystem whose variables have no prefix where it is made for one module.
 fn scenario(request: &Request) -> Result<(Scenario, Option<&'static str>)> {
     let path = Path::new(&request.target);
     // a scenario, or a system structure that is read as one

@@ -28,7 +28,7 @@ const SLOTS: u32 = 33;
 const SCENARIO: &str = "scenario.toml";
 const SETTINGS: &str = "settings.json";
 
-/// What to export, and how.
+/// Target and options of an export.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// A scenario file, or the name of a module.
@@ -41,7 +41,7 @@ pub struct Request {
     pub version: Version,
     /// Arrays element by element also in FMI 3.0.
     pub scalars: bool,
-    /// Who made the model, which version of it, and when, as the description says it.
+    /// Author, version and date of the model for the description.
     pub origin: Origin,
     /// Whether results of its first steps go into it.
     pub reference: bool,
@@ -49,7 +49,7 @@ pub struct Request {
     pub out: PathBuf,
 }
 
-/// What the FMU's own library must know beside the scenario.
+/// Settings that the FMU's own library needs beside the scenario.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ExportSettings {
@@ -57,7 +57,7 @@ struct ExportSettings {
     version: u32,
     scalars: bool,
     token: String,
-    /// Subsystem whose variables bear no prefix.
+    /// Subsystem whose variables have no prefix.
     bare: Option<String>,
 }
 
@@ -70,7 +70,7 @@ impl ExportSettings {
 /// Makes an instance from the resources of an FMU.
 ///
 /// # Errors
-/// What is missing or wrong in the resources, in words.
+/// A resource that is missing or wrong, in words.
 pub fn open(opening: &Opening) -> Result<Opened, String> {
     let path = opening.resources.join(SETTINGS);
     let text =

@@ -1,4 +1,4 @@
-//! What an FMU tells people: a page, a licence, an icon.
+//! Files of an FMU for people: a page, a licence, an icon.
 
 use std::fmt::Write;
 use terraglue_fmi::export::{About, Opened};

@@ -22,7 +22,7 @@ pub(super) struct Whole {
     testbed: Testbed,
     variables: Vec<Variable>,
     places: Vec<VariableSlot>,
-    /// Instances of `feet`, which are told how long a step is.
+    /// Instances of `feet`, which receive the length of a step.
     feet: Vec<usize>,
     capabilities: Capabilities,
     snapshots: Vec<Option<Snapshot>>,
@@ -140,7 +140,7 @@ fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Vari
     (all, places)
 }
 
-/// What all subsystems can do.
+/// Capabilities that all subsystems have.
 fn capabilities(testbed: &Testbed) -> Capabilities {
     let all = |c: Capabilities| testbed.instances().iter().all(|i| i.capabilities().has(c));
     let mut found = Capabilities::default();

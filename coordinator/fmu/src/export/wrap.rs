@@ -4,7 +4,7 @@ use std::path::Path;
 use terraglue_host::SearchPath;
 use terraglue_subsystem::Kind;
 
-/// What every small scenario holds; `--set` changes it.
+/// Text that every small scenario contains; `--set` changes it.
 const COMMON: &str =
     "[time]\nstep_s = 0.001\nduration_s = 10.0\n\n[world]\ngravity_m_s2 = [0.0, 0.0, -9.81]\n";
 

@@ -66,8 +66,8 @@ struct Bodies {
 }
 
 impl ContactDetector {
-    /// Bodies and grounds in ascending order of their indices. `terrain` stands in for a soil that shows no
-    /// field `height`.
+    /// Bodies and grounds in ascending order of their indices. `terrain` replaces the field `height` of a soil that shows
+    /// none.
     ///
     /// # Errors
     /// [`Error::Simulation`] when a ground has neither.

@@ -336,7 +336,7 @@ impl<'a> Undisturbed<'_, 'a> {
 /// The ground where it is higher: now, or before anything pressed it.
 ///
 /// A node that a body has pressed below itself still belongs to the cut that the body stands in: the size of a contact is
-/// that of the cut, not of the part that bears in this step.
+/// that of the cut, not of the part that carries load in this step.
 pub struct Cut<'r, 'a>(pub &'r Reader<'a>);
 
 impl Surface for Cut<'_, '_> {

@@ -37,7 +37,7 @@ impl Call {
     }
 }
 
-/// Writes what the instance said and how the call ended; an answer follows where it succeeded.
+/// Writes the log of the instance and the outcome of the call; an answer follows where it succeeded.
 pub fn write_outcome(w: &mut Writer, lines: &[Line], outcome: &Result) {
     w.put(&(lines.len() as u32));
     for (level, text) in lines {

@@ -92,18 +92,18 @@ impl Segment {
 
     /// Room for a call (0) or an answer (1).
     pub fn area(&mut self, which: usize) -> &mut [u8] {
-        // SAFETY: inside the mapping; the other process leaves this area alone until it is told.
+        // SAFETY: inside the mapping; the other process leaves this area alone until it is notified.
         unsafe { std::slice::from_raw_parts_mut(self.memory.as_ptr().add(HEAD + which * AREA), AREA) }
     }
 
-    /// Tells the worker that a call of that length stands there.
+    /// Notifies the worker of a call of that length.
     pub fn post_call(&self, length: usize) {
         self.head().call_length.store(length as u32, Ordering::Relaxed);
         self.head().call.fetch_add(1, Ordering::Release);
         wake(&self.head().call);
     }
 
-    /// Tells the host that the answer stands there.
+    /// Notifies the host of the answer.
     pub fn post_answer(&self, length: usize) {
         self.head().answer_length.store(length as u32, Ordering::Relaxed);
         self.head().answer.store(self.head().call.load(Ordering::Relaxed), Ordering::Release);

@@ -63,7 +63,7 @@ impl Messages {
     /// The message of a stream.
     ///
     /// # Errors
-    /// [`Error::Refused`]: there is no such stream. [`Error::Failed`]: the instance could not tell it.
+    /// [`Error::Refused`]: there is no such stream. [`Error::Failed`]: the instance could not provide the message.
     pub fn get(&self, k: usize) -> Result<Option<Message<'_>>> {
         let kept = self.kept.get(k).ok_or_else(|| Error::Refused(format!("no stream number {k}")))?;
         if let Some(Some(why)) = self.wrong.get(k) {

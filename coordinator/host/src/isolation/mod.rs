@@ -3,7 +3,7 @@
 //!
 //! The worker is this program again, or for a module in Python the user's interpreter, in a process group of its own with
 //! a limit of memory and a temporary folder of its own. Calls and answers cross through a shared segment; both sides sleep
-//! in between, after a short look. What a worker leaves behind, processes and files, goes with it.
+//! in between, after a short look. Processes and files that a worker leaves behind are removed with it.
 
 mod answers;
 mod calls;
@@ -92,7 +92,7 @@ pub enum What {
     },
 }
 
-/// All that a worker is told at the start, beside the terrain.
+/// Data that a worker receives at the start, beside the terrain.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Start {
     what: What,
@@ -108,7 +108,7 @@ struct Start {
 /// Makes an instance in a worker of its own.
 ///
 /// # Errors
-/// No worker can be started, or what the instance itself says or does while it is made.
+/// No worker can be started, or the instance fails while it is made.
 pub fn start(
     what: What,
     host: &Arc<dyn Host>,

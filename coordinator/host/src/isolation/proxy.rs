@@ -20,7 +20,7 @@ pub struct Isolated {
     about: ModuleInfo,
     tiles: Tiles,
     messages: Messages,
-    /// Whether it was told that there are no overlays for an error.
+    /// Whether a failure of the overlays was reported.
     told: Cell<bool>,
 }
 

@@ -22,10 +22,10 @@ pub(super) const FILES: [(&str, &str); 4] = [
 /// Base class of modules in Python.
 pub const SDK: &str = include_str!("../../../../interfaces/plugin/python/terraglue.py");
 
-/// Ahead of everything else on the path stand the files of this program; the working folder does not stand there.
+/// Puts the files of this program first on the path; the working folder is not on it.
 pub(super) const TAKE_FILES: &str = "import sys; sys.path[:] = [sys.argv[1]] + [p for p in sys.path if p];";
 
-/// File with what the interpreter itself says: faults, and where a module hangs.
+/// File with the messages of the interpreter itself: faults, and where a module hangs.
 const DIARY: &str = "stderr.txt";
 
 /// The command that serves the segment; None: this is no module in Python.
@@ -51,7 +51,7 @@ pub fn ask_where(child: u32, folder: &Path) {
     }
 }
 
-/// The end of what the interpreter said on its own.
+/// The end of the interpreter's own messages.
 pub fn last_words(folder: &Path) -> String {
     let text = std::fs::read(folder.join(DIARY)).unwrap_or_default();
     let text = String::from_utf8_lossy(&text);

@@ -58,7 +58,7 @@ impl Question {
         }))
     }
 
-    /// Writes what the world says.
+    /// Writes the answer of the world.
     pub fn answer(&self, world: &dyn World, w: &mut Writer) {
         match self {
             Self::Names => w.put(world.subsystems()),
@@ -135,7 +135,7 @@ struct AskingWorld<'a> {
     tiles: Vec<TilesOf>,
 }
 
-/// Lets the instance look, and asks the host what it wants to know.
+/// Lets the instance look, and passes its questions to the host.
 ///
 /// # Errors
 /// Errors of the instance. [`Error::Fatal`]: the call is garbled.

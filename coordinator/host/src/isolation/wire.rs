@@ -1,4 +1,4 @@
-//! Calls and answers as bytes in a shared segment. Whatever stands there is checked: a worker may have been overwritten.
+//! Calls and answers as bytes in a shared segment. All of them are checked: the memory of a worker may have been overwritten.
 
 use terraglue_subsystem::{
     Action, BodyRef, BodyState, Causality, Effect, Energy, FieldInfo, Figure, Geometry, JointKind,

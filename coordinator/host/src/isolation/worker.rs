@@ -1,4 +1,4 @@
-//! The worker's side: makes one instance and answers calls until it is told to quit or its host is gone.
+//! The worker's side: makes one instance and answers calls until the host ends it or is gone.
 
 use super::calls::{self, Call, OwnedStep};
 use super::channel::{self, Segment};

@@ -27,7 +27,7 @@ impl WorkerChannel {
         segment.area(0)[..length].to_vec()
     }
 
-    /// Asks the host while it waits for the answer to a call; what it says. None: the question is too long.
+    /// Asks the host while it waits for the answer to a call; returns its answer. None: the question is too long.
     pub fn ask(&self, write: impl FnOnce(&mut Writer)) -> Option<Vec<u8>> {
         {
             let mut segment = self.segment.borrow_mut();

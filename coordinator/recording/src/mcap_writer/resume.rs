@@ -49,12 +49,12 @@ impl Pending {
     }
 }
 
-/// What a writer goes on from.
+/// State from which a writer resumes.
 pub(crate) struct McapState {
     kept: (u64, f64),
     sequence: u32,
     pending: Vec<Pending>,
-    /// What was written last of each part of each subsystem.
+    /// Last written values of each part of each subsystem.
     written: Vec<Option<Vec<f64>>>,
     ground: Block,
     unseen: Vec<bool>,
@@ -86,7 +86,7 @@ impl McapWriter {
         self.pending.get_or_insert_default();
     }
 
-    /// What another process needs to go on from here.
+    /// State with which another process resumes here.
     pub fn state(&mut self, view: &View) -> Result<McapState> {
         let waited = self.sink.wait();
         self.checked(waited)?;
@@ -164,7 +164,7 @@ impl McapWriter {
     }
 }
 
-/// Gives a sink everything behind the head of a recording, chunk by chunk as it stands there.
+/// Gives a sink everything after the header of a recording, chunk by chunk as in the file.
 fn repeat(mut from: impl Read, sink: &mut Encoder) -> std::io::Result<()> {
     let other = |e: McapError| match e {
         McapError::Io(source) => source,

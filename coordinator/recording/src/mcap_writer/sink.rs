@@ -1,9 +1,9 @@
 //! Where messages go: a file of chunks, at first in the thread of the run, then behind a bounded queue on a thread of its own, which
 //! encodes chunks, compresses them and writes.
 //!
-//! One thread takes all messages in their order, so the bytes of a recording do not depend on it. What a step pays is a copy of
-//! its messages; a full queue makes it wait, and so does the end of a chunk while the chunk before is not on disk. An error of the
-//! thread is returned by a later call.
+//! One thread takes all messages in their order, so the bytes of a recording do not depend on it. A step costs a copy of its
+//! messages; it waits while the queue is full, and at the end of a chunk while the chunk before is not on disk. An error
+//! of the thread is returned by a later call.
 
 use crate::topics::Topic;
 use mcap::records::MessageHeader;
@@ -22,10 +22,10 @@ pub(super) type Encoder = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
 /// Messages that may wait.
 const WAITING: usize = 1024;
 
-/// Bytes of the file and simulated time (s) of what can be read whatever comes after.
+/// Size of the part of the file that is safe whatever comes after, bytes, and its simulated time, s.
 pub(super) type Kept = (u64, f64);
 
-/// What the thread is asked to do.
+/// A job of the thread.
 enum Job {
     Message(MessageHeader, Vec<u8>),
     /// Announces a topic and answers the number of its channel.
@@ -60,7 +60,7 @@ struct Queue {
     flushed: Option<Receiver<()>>,
 }
 
-/// What the thread has come to.
+/// Progress of the thread.
 #[derive(Default)]
 struct Progress {
     kept: Kept,
@@ -165,7 +165,7 @@ impl Sink {
         }
     }
 
-    /// What can be read whatever comes after; behind a queue it may lag what was flushed, until [`Sink::wait`].
+    /// Size and time that are safe whatever comes after; behind a queue they may lag the last flush, until [`Sink::wait`].
     pub fn kept(&self) -> Kept {
         lock(&self.progress).kept
     }
@@ -242,7 +242,7 @@ fn write_all(
             Job::Answer(done) => tell(&done, ()),
         };
         if let Err(e) = done {
-            // the encoder ends before the error is told: what it still writes is cut off then
+            // the encoder ends before the error is returned: its last bytes are cut off then
             drop(encoder);
             lock(progress).failed = Some(e);
             return None;

@@ -15,7 +15,7 @@ use terraglue_scenario::Scenario;
 use terraglue_subsystem::bytes::Block;
 use terraglue_subsystem::persist;
 
-/// What a recorder goes on from.
+/// State from which a recorder resumes.
 pub struct RecorderState {
     mcap: McapState,
     /// Length of `variables.csv`, bytes.
@@ -40,10 +40,10 @@ fn changed(error: Error) -> Error {
 }
 
 impl Recorder {
-    /// What another process needs to go on from here: everything up to now is with the operating system or in the state.
+    /// State with which another process resumes here: everything up to now is with the operating system or in the state.
     ///
     /// # Errors
-    /// A file that cannot be written, a soil that does not tell its tiles.
+    /// A file that cannot be written, a soil that does not provide its tiles.
     pub fn state(&mut self, view: &View) -> Result<RecorderState> {
         let mut summary = Block::default();
         self.summary.keep(&mut summary.0);

@@ -5,7 +5,7 @@ use crate::report::html::{escape, number, with_prefix, without_rounding};
 use crate::summary::Summary;
 use std::fmt::Write;
 
-/// A smaller share of the energies that drifts is nothing to be told in digits.
+/// A smaller drift, relative to the energies, is not given in digits.
 const SMALLEST_SHARE: f64 = 1e-5;
 
 /// One figure.
@@ -72,7 +72,7 @@ fn text(value: (String, String)) -> String {
     format!("{}\u{2009}{}", value.0, value.1)
 }
 
-/// What a roboticist asks first, in this order.
+/// The main figures of a run, in order of importance.
 fn first(s: &Summary) -> impl Iterator<Item = Card> {
     let real_time = format!(
         "{} s wall, {} s CPU, {} steps",
@@ -107,7 +107,7 @@ fn distance(s: &Summary) -> Option<Card> {
     Some(Card::new("Distance", (number(d, 4), "m".into()), more))
 }
 
-/// Electrical where a drive with losses says it, else the work of the motors.
+/// Electrical where a drive with losses reports it, else the work of the motors.
 fn energy_per_metre(s: &Summary) -> Option<Card> {
     let cost =
         |c: Option<f64>| c.map_or_else(String::new, |c| format!("; cost of transport {}", number(c, 3)));

@@ -1,5 +1,5 @@
-//! Which body a contact of a soil belongs to. A soil numbers its contacts and knows no names: the forces tell, so that a plot has
-//! the names and colours of the map.
+//! Finds the body of each contact of a soil. A soil numbers its contacts and has no names for them: equal forces identify the
+//! body, so that a plot has the names and colours of the map.
 
 use crate::reader::Recording;
 use crate::report::footprints::Leg;
@@ -38,7 +38,7 @@ impl<'a> Owners<'a> {
     }
 }
 
-/// Whether a contact bears the force of a leg at all times that both are known.
+/// Whether a contact has the normal force of a leg at all times at which both are known.
 fn is_under(recording: &Recording, leg: &Leg, table: &Table, name: &str) -> bool {
     let Some(force) = table.column(name) else { return false };
     let (mut sum, mut difference) = (0.0, 0.0);

@@ -28,7 +28,7 @@ pub fn text(value: Option<f64>) -> String {
     )
 }
 
-/// What the drift is held against, as `0.12 % of the motors' work`; why it is unknown where it is.
+/// The drift relative to its reference, as `0.12 % of the motors' work`; why it is unknown where it is.
 pub fn judgement(e: &Energies) -> String {
     match (e.drift_share(), e.drift_j) {
         (Some(share), _) => format!("{}\u{2009}% {}", number(100.0 * share, 3), e.measure()),

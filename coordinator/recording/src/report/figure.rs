@@ -34,9 +34,9 @@ pub struct Panel {
     pub log: Option<bool>,
     /// The choice for which it is shown; none: always.
     pub choice: Option<usize>,
-    /// What stands along the axis in place of the time: quantity and unit. The times of the curves are its values then.
+    /// Quantity and unit of the horizontal axis in place of the time. The times of the curves are its values then.
     pub across: Option<(String, String)>,
-    /// What is drawn in it.
+    /// Its curves.
     pub curves: Vec<Curve>,
 }
 
@@ -132,7 +132,7 @@ impl Times {
 impl Figure {
     /// As data of the page.
     pub(crate) fn json(&self, times: &mut Times) -> Value {
-        // What is shown on demand only may be coarser.
+        // Curves that are shown on demand only may be coarser.
         let points = if self.choices.len() > 1 { MOST_POINTS / 2 } else { MOST_POINTS };
         let mut curve = |c: &Curve, over_time: bool| {
             let mut out = json!({ "name": c.name, "colour": c.colour, "dashed": c.dashed, "steps": c.steps });

@@ -101,7 +101,7 @@ fn joints(recording: &Recording) -> Option<Figure> {
                 .iter()
                 .filter_map(|(part, target)| curve(part, if *target { 7 } else { row }, *target))
                 .collect();
-            // A target that is never set says nothing.
+            // A target that is never set is not drawn.
             curves.retain(|c| !c.dashed || c.y.iter().any(|v| *v != 0.0));
             panels.push(Panel { choice: Some(choice), ..Panel::new(quantity, unit, curves) });
         }
@@ -137,7 +137,7 @@ fn gluing(recording: &Recording) -> Option<Figure> {
         .log(true),
     ];
     let mut note = String::from("Largest of all steps since the record before.");
-    // of a single pass neither says anything
+    // of a single pass neither is meaningful
     if rows.iter().any(|g| g.since_last.max_gap_m.is_some()) {
         let gap = column(&|w| w.max_gap_m.unwrap_or(f64::NAN));
         panels.insert(1, Panel::new("gap", "m", vec![Curve::new("largest gap", 0, &t, gap)]).log(true));
@@ -187,7 +187,7 @@ fn pressure(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
             let of = |part: &str| table.column(&format!("{name}.{part}"));
             let (Some(sinkage), Some(pressure)) = (of("sinkage"), of("mean_pressure")) else { continue };
             let slips = of("slip").is_some_and(|slip| slip.iter().any(|s| s.abs() > SLIPS));
-            // before the first touch and in the air there is no pressure to speak of
+            // before the first touch and in the air there is no pressure
             let loaded = sinkage.iter().zip(pressure).filter(|(_, p)| **p > 0.0);
             let (x, y): (Vec<f64>, Vec<f64>) = loaded.map(|(z, p)| (*z, *p)).unzip();
             if !slips && x.len() > 1 {
@@ -213,7 +213,7 @@ fn spread_out(values: &[f64]) -> Vec<f64> {
     values.iter().step_by(every).chain(last).copied().collect()
 }
 
-/// What a soil tells of wheels and feet: one panel a quantity, one curve a contact.
+/// Contact outputs of a soil, per wheel and foot: one panel per quantity, one curve per contact.
 fn contacts(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
     let owners = Owners::new(recording, legs);
     let shown = [("slip", ""), ("sinkage", "m"), ("mean_pressure", "Pa"), ("largest_pressure", "Pa")];

@@ -1,4 +1,4 @@
-//! What pressed on the ground and where: the prints of every body that carried a normal force, and their shape from above.
+//! Prints of every body that carried a normal force, and their shape from above.
 
 use crate::prints::{Print, Touch, press};
 use crate::reader::{GroundRecord, Recording};

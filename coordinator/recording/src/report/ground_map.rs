@@ -103,7 +103,7 @@ fn extent(ground: &GroundRecord, axis: usize) -> [f64; 2] {
     [first - half, first + (ground.size[axis] as f64 - 0.5) * ground.spacing]
 }
 
-/// What a map without ground shows along an axis: outlines and path with some air, m.
+/// Range of a map without ground along an axis, m: outlines and path with a margin.
 fn around(recording: &Recording, outlines: &[Outline], axis: usize) -> [f64; 2] {
     let path =
         recording.reported_body().into_iter().flat_map(|(_, p)| p.position.iter().map(move |p| p[axis]));

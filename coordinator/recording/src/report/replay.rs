@@ -153,7 +153,7 @@ fn ground(recording: &Recording) -> Result<Value> {
 /// Nodes (of those that the page knows) with their heights.
 type Changed = BTreeMap<u32, f32>;
 
-/// What changed, collected over pieces of time; a node that comes back to what was told of it last is left out.
+/// Changes of the ground, collected over pieces of time; a node that returns to its last reported height is omitted.
 fn changes(ground: &GroundRecord, recording: &Recording, apart_s: f64, finest: f64) -> Vec<(f64, Changed)> {
     let stride = node_values::stride(ground.size);
     let columns = ground.size[0].div_ceil(stride);

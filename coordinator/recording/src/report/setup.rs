@@ -1,4 +1,4 @@
-//! What was simulated, in words: headline, modules, numbers of the run, the scenario's text.
+//! The simulation in words: headline, modules, numbers of the run, the scenario's text.
 
 use crate::reader::Recording;
 use crate::report::html::{escape, number};

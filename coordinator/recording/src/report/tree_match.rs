@@ -19,7 +19,7 @@ fn told(recording: &Recording) -> Option<(&str, &[TreeMatch])> {
     Some((stream.rsplit_once('.').map_or(stream.as_str(), |(name, _)| name), all))
 }
 
-/// The section with the map; none: nobody told of a match.
+/// The section with the map; none: no match was recorded.
 pub(crate) fn section(recording: &Recording) -> Option<String> {
     let (name, all) = told(recording)?;
     let step = all.len().div_ceil(DRAWN).max(1);
@@ -156,7 +156,7 @@ impl Map {
     }
 }
 
-/// Error and bound over time, and what the match was worth; none: nobody told of a match.
+/// Error and bound over time, and the quality of the match; none: no match was recorded.
 pub(crate) fn figure(recording: &Recording) -> Option<Figure> {
     let (name, _) = told(recording)?;
     let curve = |part: &str, label: &str, colour: usize, dashed: bool| {

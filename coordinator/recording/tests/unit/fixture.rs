@@ -18,7 +18,7 @@ pub const DEPTH: f64 = 0.012;
 pub const FEET: [&str; 6] = ["LF4", "LM4", "LR4", "RF4", "RM4", "RR4"];
 const EDGE: usize = 16;
 
-/// Robot, controller and soil are one struct: which one it is, `kind` says.
+/// Robot, controller and soil are one struct, distinguished by `kind`.
 pub struct Synthetic {
     pub kind: Kind,
     pub t: f64,

@@ -1,4 +1,4 @@
-//! Footprints that are told from each other.
+//! Separation of footprints.
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! System structures (SSP) as scenarios: every FMU becomes a subsystem, every way between two a connection.
 //!
-//! The scenario says the same as the structure in our words, so that it can be kept, read and edited.
+//! The scenario is equivalent to the structure in our keys, so that it can be kept, read and edited.
 
 mod network;
 mod values;
@@ -14,7 +14,7 @@ use terraglue_fmi::ssp::{Package, Table, Value};
 pub struct Converted {
     /// TOML.
     pub text: String,
-    /// What was left out, and what was assumed.
+    /// Notes on omitted parts and on assumptions.
     pub notes: Vec<String>,
     /// Files of all FMUs, relative to the structure.
     pub fmus: Vec<String>,
@@ -26,7 +26,7 @@ const STEPS: f64 = 1000.0;
 /// Says a structure as a scenario; `prefix` goes before the files of its FMUs.
 ///
 /// # Errors
-/// What in the structure, its FMUs or its parameters does not fit.
+/// A part of the structure, its FMUs or its parameters that does not fit.
 pub fn convert(package: &Package, prefix: &str) -> Result<Converted> {
     let network = Network::new(package)?;
     let mut values = values::values(package, &network)?;
@@ -69,7 +69,7 @@ pub fn convert(package: &Package, prefix: &str) -> Result<Converted> {
     Ok(Converted { text, notes: values.notes, fmus })
 }
 
-/// What a connection does by itself, by the units of the FMUs.
+/// Factor and offset of a connection without settings, by the units of the FMUs.
 fn usual(from: &Part, to: &Part, way: &Way) -> (f64, f64) {
     match (from.own_unit(&way.from.1), to.own_unit(&way.to.1)) {
         (Some(from), Some(to)) => from.conversion_to(&to).unwrap_or((f64::NAN, f64::NAN)),

@@ -20,9 +20,9 @@ pub struct Part<'a> {
     pub name: String,
     /// Path in the structure.
     pub path: String,
-    /// What the structure says of it.
+    /// Its entry in the structure.
     pub component: &'a Component,
-    /// What it says of itself.
+    /// Its own model description.
     pub description: ModelDescription,
 }
 
@@ -329,7 +329,7 @@ pub fn shown(key: &ConnectorPath) -> String {
     if path.is_empty() { format!("`{}`", key.1) } else { format!("`{path}.{}`", key.1) }
 }
 
-/// What makes the structure unusable.
+/// Error about a structure that cannot be used.
 pub fn refused(package: &Package, message: String) -> Error {
     Error::Refused(format!("{}: {message}", package.path().display()))
 }

@@ -12,7 +12,7 @@ use terraglue_subsystem::{ValueType, unit::Unit};
 /// Start values by the path of the FMU and the name of the variable.
 #[derive(Default)]
 pub struct Values {
-    /// What a variable starts with.
+    /// Start values of variables.
     pub start: BTreeMap<ConnectorPath, Value>,
     /// Parameters that fit nothing.
     pub notes: Vec<String>,
@@ -60,7 +60,7 @@ fn of_system(
     Ok(())
 }
 
-/// What a binding gives, under the names of the element that it is bound to.
+/// Parameters of a binding, under the names of the element that it is bound to.
 fn given<'a>(binding: &'a Binding, values: &mut Values) -> Vec<Given<'a>> {
     let name = |p: &Parameter| format!("{}{}", binding.prefix, p.name);
     let Some(mapping) = &binding.mapping else {

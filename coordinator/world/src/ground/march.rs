@@ -87,7 +87,7 @@ impl Way {
     }
 }
 
-/// What the ray meets.
+/// Intersection of the ray with the ground.
 struct Found {
     t: f64,
     /// Of a surface over cells, of any length.
@@ -172,7 +172,7 @@ impl Ground {
         }
     }
 
-    /// What the ray meets in a block that is not divided further, if it is one: a cell, or a level tile.
+    /// Intersection of the ray with a block that is not divided further, if it is one: a cell, or a level tile.
     #[inline(always)]
     fn leaf(&self, way: &Way, block: &Block, best: f64) -> Option<Option<Found>> {
         if block.level == 0 {

@@ -97,7 +97,7 @@ fn missing(description: &ModelDescription, extracted: &Path, name: &str) -> Stri
     format!("has no library `binaries/{wanted}/{name}` for this platform; {has}")
 }
 
-/// Whether the file can be a library of this machine, as far as its bytes say.
+/// Whether the file can be a library of this machine, as far as its bytes show.
 fn inspect(path: &Path) -> std::result::Result<(), String> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
     if !elf::is_elf(&bytes) {

@@ -8,7 +8,7 @@
 //! * [`nodes_below`]: the nodes of a contact patch with their covered areas; [`nodes_below_parts`]: of several shapes in one.
 //! * [`fit_plane`]: height and normal of the ground below a footprint.
 //!
-//! Nothing here knows what soil is; contact detection, soils and later sensors share it.
+//! Nothing here depends on soil; contact detection, soils and sensors share it.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-//! State per node in tiles: what soils remember (sinkage, shear, yield) without paying for untouched ground.
+//! State per node in tiles: the memory of soils (sinkage, shear, yield) without cost for untouched ground.
 
 use crate::identity::{Identity, Origin};
 use crate::lattice::{Lattice, TILE_NODES};

@@ -23,7 +23,7 @@ pub use terminals::{JointTerminal, terminals};
 pub use values::FmiType;
 pub(crate) use xml::Xml;
 
-/// What a call of an FMU did not do, with the status that the standards give it.
+/// A call that an FMU refused or failed, with the status that the standards give it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wrong {
     /// Status.

@@ -60,7 +60,7 @@ impl Capabilities {
         self.0 & other.0 == other.0
     }
 
-    /// The names of what is in the set.
+    /// The names of the capabilities in the set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.iter().filter(move |(c, _)| self.has(*c)).map(|(_, name)| *name)
     }

@@ -1,4 +1,4 @@
-//! Reading input files whole, and creating output files, but never without end: devices and pipes are refused before a byte is read, and so is what is
+//! Reading input files whole, and creating output files, but never without end: devices and pipes are refused before a byte is read, and so are files
 //! larger than any input can be.
 
 use std::fs::File;

@@ -1,4 +1,4 @@
-//! What the host offers at `instantiate`.
+//! Services of the host at `instantiate`.
 use super::constants::TgStatus;
 use super::law::TgOpenLaw;
 use std::ffi::{c_char, c_void};
@@ -70,7 +70,7 @@ pub struct TgHost {
     pub gravity: [f64; 3],
     /// The ground at the start; null: the scenario has none.
     pub terrain: *const TgTerrain,
-    /// Largest number of ground nodes that a step may show; a hint for what to reserve.
+    /// Largest number of ground nodes that a step may show; a hint for the memory to reserve.
     pub max_nodes: u32,
     /// 0.
     pub reserved: u32,

@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use terraglue_subsystem::{BodyRef, BodyState, Error, Figure, Overlay, RayMask, Result, ShapeRef, World};
 
 /// The world of one instance. It stays at one place as long as the instance: a module that keeps a pointer to it and asks outside of
-/// `observe` gets no answer, and its next call tells of it.
+/// `observe` gets no answer, and its next call reports it.
 pub(super) struct Shown {
     table: Cell<TgWorld>,
     copies: RefCell<Copies>,
@@ -30,7 +30,7 @@ struct Copies {
     subsystems: Vec<Others>,
 }
 
-/// Another subsystem, made when it is asked for.
+/// Another subsystem, made on demand.
 #[derive(Default)]
 struct Others {
     scene: OnceCell<Option<SceneTable>>,
@@ -118,7 +118,7 @@ impl Copies {
     }
 }
 
-/// The world during a call, with what was copied of it.
+/// The world during a call, with the parts copied so far.
 struct Open<'a> {
     world: &'a dyn World,
     copies: Ref<'a, Copies>,

@@ -40,7 +40,7 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, String> {
 /// Bytes of a binary STL file before its triangles, and of each triangle.
 const STL: (usize, usize) = (84, 50);
 
-/// Hides the header of a binary STL file that begins with the word of ascii ones: its length tells them apart.
+/// Hides the header of a binary STL file that begins with the word of ascii ones: its length distinguishes them.
 fn without_false_start(bytes: &mut [u8]) {
     let Some(count) = bytes.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes) else {
         return;

@@ -1,4 +1,4 @@
-//! The nodes below feet: their load, what still fits under them, and which of them have changed.
+//! The nodes below feet: their load, the room left under them, and which of them have changed.
 
 use crate::active::Marks;
 use std::cmp::Ordering;
@@ -163,10 +163,10 @@ fn put(covered: &mut [[u32; TILE_EDGE as usize]], lattice: &Lattice, node: [i32;
     *row = if set { *row | bit } else { *row & !bit };
 }
 
-/// Runs for which memory is asked at the start.
+/// Runs for which memory is allocated at the start.
 const RUNS: usize = 64;
 
-/// Sorts a list of a few runs that are in order: every foot tells its nodes by rows.
+/// Sorts a list of a few runs that are in order: every foot lists its nodes by rows.
 #[derive(Clone, Debug)]
 struct Runs {
     merged: Vec<Foot>,

@@ -26,8 +26,8 @@ impl Bound {
         Self { count: 0, law: 0, doubles, area: zero, pressure: zero, slip: zero, kept }
     }
 
-    /// Adds a node: its law by number, its inclined area (m²), pressure (Pa) and slip (m), what the law keeps of it. Answers
-    /// with the force (N) of those that had to make room.
+    /// Adds a node: its law by number, its inclined area (m²), pressure (Pa) and slip (m), the state that the law keeps of
+    /// it. Returns the force (N) of those that had to make room.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.

@@ -133,7 +133,7 @@ impl Patches {
         Ok(())
     }
 
-    /// Pressures of a law that keeps a state; what it would keep after the step is dropped.
+    /// Pressures of a law that keeps a state; the state that it would keep after the step is dropped.
     fn kept_pressures(
         &self,
         law: &Local,

@@ -66,8 +66,8 @@ impl PressureLaw {
         self.curve_in_slip(b, k_u, &SlipSinkage::None, 0.0)
     }
 
-    /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper
-    /// as `sinkage` says.
+    /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper by
+    /// `sinkage`.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.

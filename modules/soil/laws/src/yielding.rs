@@ -5,7 +5,7 @@ use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes};
 use crate::strength_law::StrengthLaw;
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
-/// Nodes whose yield stress is asked together.
+/// Nodes whose yield stress is evaluated together.
 const CHUNK: usize = 64;
 /// Newton steps until bisection has the last word.
 const STEPS: usize = 60;

@@ -271,7 +271,7 @@ impl Foot {
         }
     }
 
-    /// The body moves on by `dt` s while the cycle stands still: what stands passes below it, what flies hovers.
+    /// The body moves on by `dt` s while the cycle stands still: standing feet pass below it, swinging ones hover.
     fn wait(&mut self, cycle: &Cycle, neutral: [f64; 2], dt: f64) {
         if self.airborne {
             self.swing(cycle, Self::touch_down(cycle, neutral), dt);

@@ -89,7 +89,7 @@ impl Walker {
         self.aim(settings);
     }
 
-    /// Stands still for what remains of the waiting time; the time of the step that is left for walking, s.
+    /// Stands still for the rest of the waiting time; the time of the step that is left for walking, s.
     fn wait(&mut self, command: &Command, dt: f64) -> f64 {
         let Mode::Standing(wait) = self.mode else { return dt };
         if wait >= dt || !moves(command) {

@@ -2,7 +2,7 @@
 
 /// [`Point::ring`] of a point whose beam nobody knows.
 pub const NO_RING: u16 = u16::MAX;
-/// [`Point::body`] of a point of which nobody knows what it lies on.
+/// [`Point::body`] of a point on an unknown body.
 pub const NO_BODY: u32 = u32::MAX;
 
 /// A point.

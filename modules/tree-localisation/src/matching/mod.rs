@@ -2,7 +2,7 @@
 //!
 //! * `likelihood.rs`: how much better a pose explains the trees around than chance does.
 //! * `pairs.rs`: poses from pairs of trees that are as far apart in both maps: the descriptor.
-//! * `prior.rs`: what is known before.
+//! * `prior.rs`: prior knowledge of the pose.
 //! * `refine.rs`: the pose that explains most, its covariance.
 //! * `verdict.rs`: located, ambiguous or lost: score, runner-up and expected number of false matches.
 

@@ -132,7 +132,7 @@ fn local_pairs(trees: &[Seen], longest: f64) -> Vec<(usize, usize, f64)> {
             }
         }
     }
-    // longest in relation to what it is worth first
+    // longest in relation to the deviations first
     let worth = |(i, j, d): &(usize, usize, f64)| d / (trees[*i].deviation + trees[*j].deviation);
     all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     let most = (2 * LOCAL_PAIRS[1]).div_ceil(trees.len().max(1)) + 1;

@@ -516,7 +516,7 @@ fn kept_by_law(curve: &PressureCurve) -> bool {
     curve.keeper().is_some()
 }
 
-/// Node k at the mean depth `depth` (m) under a pressure (Pa), with its soil not yet set, and the depth of the underside at the node, m,
+/// Node k at the mean depth `depth` (m) under a pressure (Pa), its soil not yet set, and the depth of the underside at the node, m,
 /// vertical.
 fn covered(n: &PatchNodes, k: usize, [depth, pressure]: [f64; 2], n_z: f64) -> (Covered, f64) {
     let mean = (depth + relief(n, k)) / n_z;

@@ -61,11 +61,11 @@ def printed(shown, measured):
     return text.replace("-", "−") if "−" in shown else text
 
 
-# What measures.
+# Measures.
 
 @functools.cache
 def rows():
-    """Names of the figures of tests/figures.tsv, their values and what they are."""
+    """Names of the figures of tests/figures.tsv, their values and meanings."""
     with (ROOT / "tests/figures.tsv").open() as table:
         found = csv.DictReader(table, delimiter="\t", quoting=csv.QUOTE_NONE)
         return {row["id"]: (float(row["value"]), row["what"]) for row in found if row["value"] != "-"}
@@ -260,7 +260,7 @@ def stiffness():
     return text
 
 
-# (file, name of the marks) → what makes it
+# (file, name of the marks) → function that makes it
 BLOCKS = {("docs/gluing.md", "moon_walk"): strategies, ("docs/gluing.md", "stiffness"): stiffness}
 
 

@@ -48,7 +48,7 @@ def test_a_figure_that_has_changed_is_found_and_written():
 
 
 def test_scenarios_say_no_figure_that_nobody_measures():
-    """Headers of scenarios: a number with a unit of what comes out is a claim, or it is a number of the file or of its models."""
+    """Headers of scenarios: a number with a unit that is a result is a claim, or it is a number of the file or of its models."""
     loose = []
     for path in sorted((ROOT / "scenarios").glob("*.toml")):
         text = path.read_text()

@@ -22,7 +22,7 @@ VARIABLES = """<ModelVariables>
 <ScalarVariable name="mode" valueReference="2" causality="parameter"><Real start="0"/></ScalarVariable>
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>"""
 
-# x' = -k x by Euler's explicit rule; after t = 0.25 s it does what `mode` says: 1 NaN, 2 error, 3 fatal, 4 discards
+# x' = -k x by Euler's explicit rule; after t = 0.25 s it acts by `mode`: 1 NaN, 2 error, 3 fatal, 4 discards
 # steps longer than 0.1 s, 5 answers a status that does not exist.
 CODE = r"""
 #include <math.h>

@@ -1,4 +1,4 @@
-"""A run that is served: what clients change takes effect and stands in the recording, what they may not is refused with the reason,
+"""A run that is served: changes by clients take effect and are recorded, changes that are not allowed are refused with the reason,
 and watching changes nothing."""
 
 import base64

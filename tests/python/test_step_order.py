@@ -256,7 +256,7 @@ def test_an_array_of_one_element_and_a_scalar_fit(tmp_path):
 
 
 def squares(folder, version, knows=True):
-    """A source with y = t² that tells its derivative, and a sum that holds its input over a step."""
+    """A source with y = t² that provides its derivative, and a sum that holds its input over a step."""
     build(folder, "integrator", INTEGRATOR, "r[1] += h * r[0];", depends="")
     flags = 'maxOutputDerivativeOrder="1"' if knows else ""
     if version == 2:

@@ -50,7 +50,7 @@ pub fn figures(folder: &Path, quick: bool) -> Outcome<Vec<Figure>> {
     ])
 }
 
-/// What a process holds.
+/// Resources of a process.
 #[derive(Default)]
 struct Holdings {
     files: f64,

@@ -90,7 +90,7 @@ fn scenario(all: &[(&str, &str)], connections: &[(&str, &str)]) -> String {
     format!("{HEAD}{fmus}{}", connect.collect::<String>())
 }
 
-/// What is left of the equations for the outputs `y` of all FMUs.
+/// Residual of the equations for the outputs `y` of all FMUs.
 fn solved(
     folder: &Path,
     all: &[(&str, &str)],

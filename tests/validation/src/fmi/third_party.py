@@ -1,4 +1,4 @@
-"""An FMU in FMPy, from its start to its end, all outputs. It says, line by line:
+"""An FMU in FMPy, from its start to its end, all outputs. It prints, line by line:
 
 NONE reason              it is no FMU for co-simulation on this machine, and nothing was run
 EXPERIMENT start stop step on|off        the last word: with event mode, where an FMU with clocks offers it

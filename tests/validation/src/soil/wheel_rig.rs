@@ -25,7 +25,7 @@ pub struct Bench<S = Box<dyn Subsystem>> {
     nodes: Vec<Node>,
 }
 
-/// What the bench shows, means over a way.
+/// Readings of the bench, means over a way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Depth of the lowest point below the undisturbed level, m.

@@ -4,7 +4,7 @@ use super::reference;
 use crate::process::{Outcome, cargo, command as start, root, target};
 use std::process::Command;
 
-/// What measures it.
+/// The command that measures it.
 pub fn command() -> Outcome<Command> {
     let (manifest, place) =
         (root().join("tests/validation/peers/rapier/Cargo.toml"), target().join("peers/rapier"));

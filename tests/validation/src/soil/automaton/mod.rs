@@ -33,7 +33,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What the automaton costs; nothing where no clock is to be read.
+/// Cost of the automaton; nothing where no clock is to be read.
 pub fn cost(context: &Context) -> Outcome<Vec<Figure>> {
     if !context.timing {
         return Ok(Vec::new());

@@ -398,7 +398,7 @@ class Subsystem:
         """Paper, step 5: the last trial is accepted under t; the other side moved to `partner`."""
 
     def observe(self, step, world):
-        """With SEES in `can`: the committed world, once per step after all have committed; what is seen belongs to the state
+        """With SEES in `can`: the committed world, once per step after all have committed; observations belong to the state
         at t + h. At the start of a run step.h = 0."""
 
     def shape_visibility(self):

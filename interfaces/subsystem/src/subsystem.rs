@@ -106,7 +106,7 @@ pub trait Subsystem: Send {
 
     /// Looks at the committed world. Called once per step of an instance with [`Capabilities::SEES`], after all subsystems
     /// have committed the step and before anything reads them; `step` is the one that was committed, or has h = 0 at the
-    /// start of a run. What is seen belongs to the committed state: variables, streams and `save_state` contain it from t + h
+    /// start of a run. Observations belong to the committed state: variables, streams and `save_state` contain it from t + h
     /// on. Nothing of `world` may be kept.
     ///
     /// # Errors

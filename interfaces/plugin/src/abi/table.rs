@@ -214,7 +214,7 @@ pub struct TgSubsystem {
     pub law: *const TgNodeLaw,
 
     /// Since 3.1, as all below. Looks at the committed world: with the capability TG_CAN_SEE, after all instances have
-    /// committed the step, which `step` shows without ports. What is seen belongs to the committed state: variables,
+    /// committed the step, which `step` shows without ports. Observations belong to the committed state: variables,
     /// streams and `save_state` contain it from t + h on. `world` is valid for the call only. When: once per step,
     /// after `commit`; at the start of a run with h = 0. Thread: that of the instance.
     pub observe: Option<

@@ -1,4 +1,4 @@
-"""Figures of our own simulations that stand in sentences: of README, docs/ and the headers of scenarios.
+"""Figures of our own simulations that sentences quote: in README, docs/ and the headers of scenarios.
 
 Each claim names a file, its words with `{}` where a figure stands, and what measures it: a figure of tests/figures.tsv
 (which `cargo xtask validate --quick --check-docs` holds against a measurement), or a run. A block between two marks is
@@ -35,7 +35,7 @@ class Claim(NamedTuple):
         return re.compile(FIGURE.join(parts))
 
     def found(self, text):
-        """The place of the words, which stand there once."""
+        """The place of the words, which occur once."""
         places = list(self.pattern().finditer(text))
         if len(places) != 1:
             raise AssertionError(f"{self.file}: `{self.words}` stands there {len(places)} times, not once")

@@ -1,4 +1,4 @@
-"""The commands that stand in pages, in headers of scenarios and in `--help`, and the files needed to run them as they stand.
+"""The commands of pages, of headers of scenarios and of `--help`, and the files needed to run them as they are.
 
 A *command* is a line of a ```sh block (or of one without a language that begins with `terraglue` or `cargo`), or a code span that
 begins with one of the two. With a placeholder in it (`terraglue check FILE`, `terraglue fmu run | info | check`) or alone (`terraglue
@@ -194,7 +194,7 @@ def short(part):
     return part.replace("--set event=[] ", "--set 'event=[]' ")
 
 
-# Files that a reader brings along, by the names that the pages give them: each is put where a command wants it.
+# Files that a reader brings along, by the names that the pages give them: each is put where a command needs it.
 def copied(source):
     return lambda place, name: shutil.copy(ROOT / source, place / name)
 

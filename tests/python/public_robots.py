@@ -115,7 +115,7 @@ def by_pinocchio(path, ours):
     text = path.read_text()
     if "xmlns:xacro" in text:
         text = expanded(path)
-    # Urdfdom wants limits where the reader does not, and no byte order mark.
+    # Urdfdom requires limits where the reader does not, and no byte order mark.
     with quiet():
         if ours["base"] == "free":
             model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())

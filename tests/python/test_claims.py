@@ -1,4 +1,4 @@
-"""The figures that stand in sentences are those that are measured (`claims.py`)."""
+"""The figures quoted in sentences are those that are measured (`claims.py`)."""
 
 import re
 
@@ -63,7 +63,7 @@ def test_scenarios_say_no_figure_that_nobody_measures():
 
 
 def given(figure, keys):
-    """Whether a number stands in the keys and their comments."""
+    """Whether a number occurs in the keys and their comments."""
     return re.search(rf"(?<![\d.]){re.escape(figure)}0*(?![\d])", keys) is not None
 
 

@@ -1,4 +1,4 @@
-"""Every command that stands in a page, in the header of a scenario or in `--help` is typed as it stands, shortened by
+"""Every command in a page, in the header of a scenario or in `--help` is typed as it is, shortened by
 `documented.shortened`, one after the other in a copy of the repository's scenarios and models. Commands that are not run are in
 `documented.NOT_RUN` with their reasons; their options are held against `--help`, as those of forms with placeholders."""
 

@@ -75,7 +75,7 @@ def test_a_new_scenario_stands(tmp_path, name):
     # it stands still from the start: nothing swings on its joints
     assert summary["peak_force_over_weight"] <= 1.1
     assert 0 < summary["max_sinkage_m"] < 0.03
-    # at rest next to nothing is turned over: rounding is held against the energy that stands in the sunken weight
+    # at rest next to nothing is turned over: rounding is compared with the energy of the sunken weight
     mass = json.loads(terraglue("robot", robot, "--json").stdout)["mass_kg"]
     sunken_j = 1.62 * mass * summary["max_sinkage_m"]
     assert abs(summary["energies"]["drift_j"]) < 1e-8 * sunken_j, summary["energies"]

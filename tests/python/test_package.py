@@ -60,7 +60,7 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def tg(site):
-    """The package in this process; the modules of plugins have the same name and are asked for by other processes only."""
+    """The package in this process; the modules of plugins have the same name and are loaded by other processes only."""
     sys.path.insert(0, str(site))
     try:
         import terraglue

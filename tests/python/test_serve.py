@@ -22,7 +22,7 @@ TORQUE = "robot.RF_j2.max_torque"
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """0.6 s of the walk that nobody watches: the folder."""
+    """The folder of 0.6 s of the walk that nobody watches."""
     folder = tmp_path_factory.mktemp("plain") / "out"
     process = terraglue("run", MOON_WALK, "--duration", "0.6", "--out", folder)
     assert process.returncode == 0, process.stderr

@@ -32,7 +32,7 @@ impl Default for Limits {
     }
 }
 
-/// Up to this size nothing is looked at as a bomb: tables of one number may shrink to a thousandth.
+/// Up to this size nothing counts as a bomb: tables of one number may shrink to a thousandth.
 const SMALL: u64 = 256 << 20;
 
 /// A zip archive that was checked as a whole.

@@ -115,7 +115,7 @@ fn inspect(path: &Path) -> std::result::Result<(), String> {
 
 /// Opens a library. Some FMUs forget to link the mathematics library, or that of Python: they get a second try with it.
 fn open(path: &Path) -> std::result::Result<Library, String> {
-    // SAFETY: the user asked for this FMU; its constructors run.
+    // SAFETY: the user requested this FMU; its constructors run.
     let once = || unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
     let first = match once() {
         Ok(library) => return Ok(library),

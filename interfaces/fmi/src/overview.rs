@@ -193,7 +193,7 @@ fn terminals(bytes: &[u8]) -> Vec<Fact> {
 fn standard(bytes: &[u8]) -> Option<[String; 3]> {
     let document = Document::parse(std::str::from_utf8(bytes).ok()?).ok()?;
     let root = document.root_element();
-    // the attributes stand in the namespace of the layered standards
+    // the attributes are in the namespace of the layered standards
     let of = |name: &str| {
         let found = root.attributes().find(|a| a.name() == name);
         found.map(|a| a.value().trim().to_owned()).unwrap_or_default()

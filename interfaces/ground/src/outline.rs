@@ -285,7 +285,7 @@ fn rounded_outline(shape: &Placed, half_length: f64, radius: f64, flat: bool) ->
     Outline::Polygon(polygon)
 }
 
-/// Directions in which the corners of a mesh are looked for.
+/// Directions in which the corners of a mesh are searched.
 const DIRECTIONS: usize = 32;
 
 /// Hull of the corners of a convex mesh that lie farthest in each of 32 horizontal directions: all its corners seen from above but

@@ -5,7 +5,7 @@ use crate::Surface;
 /// A plane through (x, y, height) with an upward unit normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Height at the point that was asked for, m.
+    /// Height at the queried point, m.
     pub height: f64,
     /// Upward unit normal, world.
     pub normal: [f64; 3],

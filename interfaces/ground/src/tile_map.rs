@@ -24,7 +24,7 @@ pub struct TileMap<T> {
 }
 
 /// Exact copy of the tiles of a [`TileMap`] that exist; refilled without allocation once it was large enough, and without
-/// looking at tiles that nobody has written since.
+/// reading tiles that are unchanged since.
 #[derive(Clone, Debug)]
 pub struct TileMapSnapshot<T> {
     touched: Vec<u32>,

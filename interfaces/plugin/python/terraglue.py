@@ -300,7 +300,7 @@ SHAPES, THE_GROUND = 1, 2
 
 
 class World:
-    """The committed world of the step [start, time], valid during `observe`: everything asked is of the time that the
+    """The committed world of the step [start, time], valid during `observe`: every answer is for the time that the
     question names within it, interpolated between the committed states; nothing of what comes after is known. Subsystems are
     numbered by their place in `subsystems`, bodies are pairs (subsystem, body). `skip` is a body that rays pass by."""
 
@@ -410,7 +410,7 @@ class Subsystem:
         return None
 
     def overlays(self):
-        """A list of `Overlay` to show with the bodies; called only when somebody looks."""
+        """A list of `Overlay` to show with the bodies; called only when they are displayed or recorded."""
         return []
 
     def restored(self):

@@ -62,7 +62,7 @@ class Segment:
         return min(head[2], AREA)
 
     def post(self, length):
-        """The answer stands there."""
+        """The answer is written."""
         self.head[3] = length
         if self._weak:
             # A call of the kernel orders earlier writes before the counter.

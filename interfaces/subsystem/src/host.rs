@@ -26,7 +26,7 @@ pub trait Host: Send + Sync {
     fn parallel_for(&self, n: usize, job: &(dyn Fn(usize) + Sync)) {
         (0..n).for_each(job);
     }
-    /// Whether the user asked to stop; long calls look at it.
+    /// Whether the user requested a stop; long calls poll it.
     fn cancelled(&self) -> bool {
         false
     }

@@ -37,7 +37,7 @@ pub trait Subsystem: Send {
     /// Capabilities of this instance.
     fn capabilities(&self) -> Capabilities;
 
-    /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+    /// Paper, step 1. The ports of this step (grounds come first). Returns the committed X, V and,
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan φ, t_max), one
     /// per port; a ground's `x` along n is its own continuous surface x2 below the body, from its unrounded state.
     /// The default suits a body: its origin lies on itself, and it has no force of its own.
@@ -249,8 +249,8 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
-    /// Appends overlays of the committed state, shown with the bodies, to `out`. Called only when somebody looks or a
-    /// recording asks, so it may cost what it needs.
+    /// Appends overlays of the committed state, shown with the bodies, to `out`. Called only when they are displayed or
+    /// recorded, so it may be expensive.
     fn overlays(&self, _out: &mut Vec<Overlay>) {}
 
     /// Fields over the ground. `height`, where offered, is the surface that contact detection reads.

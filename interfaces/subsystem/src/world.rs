@@ -18,7 +18,7 @@ use crate::material::Material;
 use crate::pose::BodyState;
 use crate::scene::Scene;
 
-/// The committed world at the end of a step, and within the step interpolated to the time asked for.
+/// The committed world at the end of a step, and within the step interpolated to the requested time.
 ///
 /// Subsystems are numbered in the order of the scenario; [`World::subsystems`] names them.
 pub trait World {
@@ -33,7 +33,7 @@ pub trait World {
         0
     }
 
-    /// First and last time that can be asked for, s.
+    /// First and last time of a query, s.
     fn interval(&self) -> [f64; 2];
 
     /// Names of all subsystems; their numbers are places in this list.
@@ -69,7 +69,7 @@ pub trait World {
     fn overlap(&self, centre: [f64; 3], radius: f64, mask: &RayMask, found: &mut Vec<ShapeRef>);
 
     /// Fields of a subsystem as committed at t + h; empty: it has none. Those of a subsystem that sees itself are not shown, as
-    /// they may change while the world is looked at.
+    /// they may change during its own look.
     fn fields(&self, _subsystem: u32) -> &[FieldInfo] {
         &[]
     }

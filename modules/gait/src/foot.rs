@@ -106,8 +106,8 @@ pub struct Foot {
     pub searching: bool,
     /// Whether it has pressed on ground since its last swing.
     pub found: bool,
-    /// Whether it has looked for ground down to the limit without finding it, and has found none since: nobody waits for
-    /// it, as the leg may be gone.
+    /// Whether it has looked for ground down to the limit without finding it, and has found none since: the gait does
+    /// not wait for it, as the leg may be gone.
     pub missing: bool,
     lift_off: [f64; 2],
     lift: f64,

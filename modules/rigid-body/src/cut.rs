@@ -46,7 +46,7 @@ enum Side {
     Tip,
 }
 
-/// Keeps the part that the scenario wants, also of the couplings and loops in `file`.
+/// Keeps the part that the scenario selects, also of the couplings and loops in `file`.
 pub(crate) fn keep(
     config: &Config,
     base: &Isometry3<f64>,

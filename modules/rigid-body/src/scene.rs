@@ -14,7 +14,7 @@ use terraglue_subsystem::{
 
 /// Name of the body that carries the fixed shapes; `world'`, … where a robot has a body of that name.
 const WORLD: &str = "world";
-/// A height field is drawn with at most this many nodes along a side: it is looked at, not calculated with.
+/// A height field is drawn with at most this many nodes along a side: it is for display only.
 const DRAWN_NODES: usize = 129;
 
 /// All bodies and shapes; ids count through the shapes.

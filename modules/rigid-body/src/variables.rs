@@ -485,7 +485,7 @@ fn motion_part(model: &Model, state: &State, body: usize, part: usize) -> [f64; 
     }
 }
 
-/// Reads numbers. Bodies that are asked for whole are read whole: a recording asks for all.
+/// Reads numbers. Bodies that are requested whole are read whole: a recording requests all.
 pub(crate) fn numbers(model: &Model, state: &State, mut ids: &[u32], mut out: &mut [f64]) -> Result {
     let all = BODY_ITEMS.len();
     while let (Some(id), false) = (ids.first(), out.is_empty()) {

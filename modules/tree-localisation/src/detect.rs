@@ -8,7 +8,7 @@ use crate::scan::{Point, Scan};
 use crate::slices;
 use crate::stems::{Revolution, Stem, StemRules, stems};
 
-/// How stems are looked for.
+/// Settings of the search for stems.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Detector {
     /// Points that are left out.

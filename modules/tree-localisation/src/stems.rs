@@ -28,7 +28,7 @@ pub struct Stem {
     pub share: f64,
 }
 
-/// A turn as stems are looked for: its rings, where its scanner stood and how it was turned.
+/// A turn in the search for stems: its rings, where its scanner stood and how it was turned.
 #[derive(Clone, Debug)]
 pub struct Revolution {
     /// Its points, beam by beam.
@@ -42,7 +42,7 @@ pub struct Revolution {
 /// Criteria of a stem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StemRules {
-    /// Heights above the ground that are looked at, m.
+    /// Heights above the ground that are searched, m.
     pub heights_m: [f64; 2],
     /// Fewest beams.
     pub fewest: u32,

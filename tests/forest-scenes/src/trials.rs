@@ -1,4 +1,4 @@
-//! Trials of matching: a map of a stand with errors, and the trees that somebody sees from a place in it.
+//! Trials of matching: a map of a stand with errors, and the trees visible from a place in it.
 
 use terraglue_forest::{Growth, Stand, Survey};
 use terraglue_numerics::random::Random;

@@ -196,7 +196,7 @@ fn judged(
     Ok(figures)
 }
 
-/// The figures of the parts of an area that were asked for; each is shown as soon as it is there.
+/// The figures of the requested parts of an area; each is shown as soon as it is there.
 fn measured(
     area: &str,
     parts: &[Part],
@@ -241,7 +241,7 @@ pub fn write_pictures() -> Outcome {
     walk::write_picture(&program("debug"))
 }
 
-/// The parts to measure: all, or the one that was asked for.
+/// The parts to measure: all, or the requested one.
 fn chosen<'a>(parts: &'a [Part], wanted: Option<&str>) -> Outcome<&'a [Part]> {
     let Some(wanted) = wanted else { return Ok(parts) };
     let found = parts.iter().position(|(name, _)| *name == wanted);

@@ -96,7 +96,7 @@ impl StoredFigures {
         )
     }
 
-    /// Figures of an area that are not stored, are stored otherwise, or are stored and nobody measures.
+    /// Figures of an area that are not stored, are stored otherwise, or are stored but not measured.
     pub fn differences(&self, area: &str, figures: &[Figure]) -> Vec<String> {
         let cure = "run `cargo xtask docs` or `cargo xtask validate AREA --quick --write-docs`";
         let differs = figures.iter().filter_map(|figure| {

@@ -99,7 +99,7 @@ pub struct Capabilities {
     pub may_return_early: bool,
     /// Intermediate update (FMI 3).
     pub intermediate_update: bool,
-    /// Ends a step early where it is asked to in an intermediate update (FMI 3).
+    /// Ends a step early on request in an intermediate update (FMI 3).
     pub return_early: bool,
     /// Takes derivatives of its inputs (FMI 2).
     pub interpolates_inputs: bool,

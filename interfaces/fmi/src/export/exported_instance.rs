@@ -63,7 +63,7 @@ impl Mailbox {
     }
 }
 
-/// Where an instance stands in its life.
+/// Phase of an instance's life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Made; start values and parameters may be set.

@@ -2,7 +2,7 @@
 //!
 //! Everything here is safe Rust and knows no pointer. [`ExportedInstance`] is an instance as the standards see it: phases,
 //! value references, saved states, the log. [`describe`] writes `modelDescription.xml` from the variables, and
-//! [`pack`] the archive. The functions of the C interfaces, which wrap a [`ExportedInstance`], stand in the library that goes
+//! [`pack`] the archive. The functions of the C interfaces, which wrap an [`ExportedInstance`], are in the library that goes
 //! into the archive.
 
 mod describe;

@@ -1,4 +1,4 @@
-//! The instance on the other side of the C interface: each call of it is looked at before, and its status after.
+//! The instance on the other side of the C interface: each call is checked before, and its status after.
 
 use super::functions::{Api, Callbacks2, InstanceHandle};
 use super::log::InstanceLog;

@@ -1,5 +1,5 @@
-//! Intermediate update (FMI 3.0, 4.2.2): an FMU shows values at its own inner steps, takes inputs there and may be asked to
-//! stop there.
+//! Intermediate update (FMI 3.0, 4.2.2): an FMU shows values at its own inner steps, takes inputs there and can be
+//! requested to stop there.
 //!
 //! An FMU calls from inside its `doStep`. A call at another time, from another thread, from inside another call of its
 //! own or without places for an answer is ignored and logged once.
@@ -24,7 +24,7 @@ pub struct IntermediateRow {
     pub t: f64,
     /// Whether the FMU has finished an inner step there; else it is a trial of its solver.
     pub finished: bool,
-    /// Of the variables that were asked for, arrays one after the other.
+    /// Of the requested variables, arrays one after the other.
     pub values: Vec<f64>,
 }
 
@@ -133,7 +133,7 @@ impl Updates {
 
 impl Inner {
     fn inside(&mut self, window: Window, t: f64, [requested, allowed, finished]: [bool; 3]) {
-        // the standard wants all that is read to be read before anything is set
+        // the standard requires all reads before anything is set
         let read = allowed && !self.references.is_empty();
         let mut done = if read { self.read(window, t, finished) } else { Ok(()) };
         if requested && done.is_ok() {

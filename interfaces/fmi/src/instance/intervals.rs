@@ -37,7 +37,7 @@ pub struct ToldClock {
     resolution: Cell<f64>,
     /// The counter that was reported last.
     counter: Cell<f64>,
-    /// Whether it has just ticked, so that its next interval is asked for.
+    /// Whether it has just ticked, so that its next interval is read.
     ticked: Cell<bool>,
 }
 

@@ -166,7 +166,7 @@ impl InstanceLog {
     }
 }
 
-/// Text of an FMU, however broken; at most some thousand bytes are looked at.
+/// Text of an FMU, however broken; at most some thousand bytes are read.
 ///
 /// # Safety
 /// `text` is null or points at bytes up to a zero.

@@ -46,7 +46,7 @@ pub struct Stepped {
 
 /// Where a part of a step has ended.
 enum PartEnd {
-    /// At the time that was asked for.
+    /// At the requested time.
     Stop,
     /// Before it, where the FMU goes on.
     Before,

@@ -57,7 +57,7 @@ pub struct TgHost {
     /// When: in a call of the instance. Thread: that of the call, or of a job.
     pub parallel_for:
         Option<unsafe extern "C" fn(ctx: *mut c_void, n: usize, job: TgJob, arg: *mut c_void) -> TgStatus>,
-    /// 1: the user asked to stop; long calls look at it.
+    /// 1: the user requested a stop; long calls poll it.
     /// When: from `instantiate` to `free`. Thread: any.
     pub cancelled: Option<unsafe extern "C" fn(ctx: *mut c_void) -> i32>,
     /// Seed for everything random in this instance.

@@ -70,7 +70,7 @@ pub struct TgRayMask {
     pub skip: TgBodyRef,
 }
 
-/// The committed world at the end of a step, and within the step interpolated to the time asked for; valid during
+/// The committed world at the end of a step, and within the step interpolated to the requested time; valid during
 /// `observe` only, and to be called from its thread. Nothing after the step is known. An answer depends on the question and
 /// the committed states alone. Called outside of `observe` it returns nothing, and the call counts as TG_FATAL.
 #[repr(C)]
@@ -84,7 +84,7 @@ pub struct TgWorld {
     pub subsystems: *const *const c_char,
     /// Changes whenever names or scenes of subsystems do.
     pub revision: u64,
-    /// First and last time that can be asked for, s: the committed step. Times outside count as the nearest end.
+    /// First and last time of a query, s: the committed step. Times outside count as the nearest end.
     pub interval: [f64; 2],
     /// First argument of the functions below.
     pub ctx: *mut c_void,

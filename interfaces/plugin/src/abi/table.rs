@@ -63,7 +63,7 @@ pub struct TgSubsystem {
 
     /// Required up to here; below, null means: not offered.
     ///
-    /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+    /// Paper, step 1. The ports of this step (grounds come first). Returns the committed X, V and,
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan phi, t_max), one
     /// per port; a ground's x along n is its own surface x2 under the body.
     /// When: in a step, before its trials; again when the step is repeated. Thread: that of the instance.
@@ -237,12 +237,12 @@ pub struct TgSubsystem {
     /// All streams, and their number; valid and constant until `free`.
     /// When: at any time after `instantiate`. Thread: that of the instance.
     pub streams: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgStream) -> usize>,
-    /// The message that the last committed step made on a stream; may be asked for any number of times.
+    /// The message that the last committed step made on a stream; may be called any number of times.
     /// When: at any time. Thread: that of the instance.
     pub stream:
         Option<unsafe extern "C" fn(instance: *mut c_void, stream: usize, out: *mut TgMessage) -> TgStatus>,
     /// Overlays to show with the bodies, and their number; valid until the next call of the instance. Called only when
-    /// somebody looks. When: at any time. Thread: that of the instance.
+    /// they are displayed or recorded. When: at any time. Thread: that of the instance.
     pub overlays: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgOverlay) -> usize>,
 }
 

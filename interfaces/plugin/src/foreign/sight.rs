@@ -17,7 +17,7 @@ pub(super) struct Shown {
     copies: RefCell<Copies>,
     /// The world during a call.
     open: Cell<Option<*const (dyn World + 'static)>>,
-    /// Whether it was asked while it was closed.
+    /// Whether it was called while it was closed.
     misused: Cell<bool>,
 }
 
@@ -96,7 +96,7 @@ impl Shown {
         done.and_then(|()| self.check())
     }
 
-    /// Refuses an instance that has asked while the world was closed.
+    /// Refuses an instance that has called it while the world was closed.
     pub(super) fn check(&self) -> Result {
         if !self.misused.get() {
             return Ok(());

@@ -116,7 +116,7 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
     Ok(())
 }
 
-/// Attributes that `urdf-rs` wants and that are optional in the format: element, attribute, value.
+/// Attributes that `urdf-rs` requires and that are optional in the format: element, attribute, value.
 const LEFT_OUT: [(&str, &str, &str); 3] =
     [("limit", "effort", "0"), ("limit", "velocity", "0"), ("texture", "filename", "")];
 
@@ -129,7 +129,7 @@ const EMPTY: [(&str, &str, &str); 2] = [
 /// The text with declarations for its undeclared prefixes, which most readers of URDF tolerate; lines stay.
 pub(crate) fn declared(text: &str) -> String {
     let mut text = text.to_owned();
-    // As many as anybody would have.
+    // More than any file has.
     for _ in 0..16 {
         let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = Document::parse(&text) else { break };
         let Some(root) = text.find("<robot").map(|at| at + "<robot".len()) else { break };

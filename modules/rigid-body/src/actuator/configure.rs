@@ -8,7 +8,7 @@ use crate::placement::matches;
 use serde_json::Value;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// A drive train with numbers that stand in a public source.
+/// A drive train with numbers from a public source.
 struct Preset {
     name: &'static str,
     kind: Drivetrain,

@@ -1,4 +1,4 @@
-//! dX, dV and dA/d(wrench on itself) of a trial at ports of glued joints, as exact as its Newton iteration wants them.
+//! dX, dV and dA/d(wrench on itself) of a trial at ports of glued joints, as exact as its Newton iteration needs them.
 //!
 //! Contacts alone take [`Ports::compliance`] instead: within a step their soils deflect far more than the terms left
 //! out.

@@ -10,7 +10,7 @@ use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 const GROUND: &str = "ground";
 /// Pattern of all pairs.
 const ALL: &str = "*";
-/// A parameter: name, value where a scenario is silent, largest value, help.
+/// A parameter: name, default, largest value, help.
 type SurfaceParameter = (&'static str, f64, f64, &'static str);
 
 const FRICTION: SurfaceParameter =

@@ -296,7 +296,7 @@ impl Dynamics {
         self.kkt.factor(&self.closing.cuts)?;
         self.kkt.factored = true;
         self.kkt.factor_count += 1;
-        // Rigid rows along axes are asked for their impulses by every trial.
+        // Every trial needs the impulses of rigid rows along axes.
         let rigid =
             |(joint, c): (&Joint, &[Option<f64>; 6])| joint.free_row().is_some_and(|r| c[r] == Some(0.0));
         self.lean = self.is_plain() && !self.model.joints.iter().zip(&self.kkt.compliance).any(rigid);

@@ -12,11 +12,11 @@ use terraglue_soil_contact::{Covered, Ground, Material};
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Config, Error, Host, Result, Variable};
 
-/// κ_max where a scenario is silent, 1/m: a ridge rounded at 2.5 cm.
+/// Default of κ_max, 1/m: a ridge rounded at 2.5 cm.
 pub const DEFAULT_CURVATURE: f64 = 40.0;
-/// Share of the pressed volume that becomes denser where a scenario is silent: 1 − D_r. Loose soil (D_r = 0) gives way by
-/// compaction alone, dense soil (D_r = 1) is pushed aside whole (Vesić 1973, general and punching shear failure). The
-/// relative density of the upper 15 cm of lunar soil is 65 % (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table 9.5).
+/// Default share of the pressed volume that becomes denser: 1 − D_r. Loose soil (D_r = 0) gives way by compaction alone, dense
+/// soil (D_r = 1) is pushed aside whole (Vesić 1973, general and punching shear failure). The relative density of the upper 15
+/// cm of lunar soil is 65 % (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table 9.5).
 pub const DEFAULT_COMPACTION: f64 = 0.35;
 /// Height of a slide of which nothing is known yet, m.
 const FIRST_SLIDE: f64 = 0.1;

@@ -9,7 +9,7 @@ use terraglue_soil_contact::{Covered, Ground};
 pub const OPEN: i32 = i32::MAX;
 /// Inlet of a node with open sky, units.
 pub const OPEN_INLET: i32 = OPEN / 16;
-/// Load and room change in steps of so many units (61 µm), so that a foot at rest wakes nobody.
+/// Load and room change in steps of so many units (61 µm), so that a foot at rest wakes no node.
 const QUANTUM: i32 = 256;
 
 /// Largest flux over one of up to sixteen paths into a node in one pass, units.

@@ -117,7 +117,7 @@ impl Standing {
         Self { along: faces(), across: faces(), wake: Vec::with_capacity(rows), beyond }
     }
 
-    /// Nothing is looked for.
+    /// Clears the marks of all faces.
     pub fn clear(&mut self) {
         self.along.clear();
         self.across.clear();

@@ -15,7 +15,7 @@ use terraglue_subsystem::Host;
 pub const ROUND: u32 = 8;
 /// Nodes of a window beyond which it pays to give windows to several threads.
 const PARALLEL_NODES: i64 = 4096;
-/// Edge of the blocks in which the ground is looked through, in tiles.
+/// Edge of the blocks in which the ground is scanned, in tiles.
 const BLOCK_TILES: u32 = 4;
 
 /// Counts of the last step, and sums since the start.

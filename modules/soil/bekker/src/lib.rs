@@ -39,7 +39,7 @@ impl Module for SoilBekker {
 
 /// Key of the option.
 const TRANSPORT: &str = "material_transport";
-/// Share of the pressed volume that becomes denser where a scenario is silent: all, as without transport.
+/// Default share of the pressed volume that becomes denser: all, as without transport.
 const ALL: f64 = 1.0;
 
 fn parameters() -> Vec<Parameter> {

@@ -164,7 +164,7 @@ impl Patches {
         Ok(sum)
     }
 
-    /// The same where [`Patches::noted_wrench`] was asked at `x` before.
+    /// The same where [`Patches::noted_wrench`] was evaluated at `x` before.
     pub fn noted_stiffness(&self, p: usize, x: &[f64; 6], noted: &Noted) -> Stiffness {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();

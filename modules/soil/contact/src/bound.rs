@@ -4,10 +4,10 @@ use crate::patch::Local;
 use terraglue_soil_law::YieldNodes;
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
-/// Nodes that are asked together.
+/// Nodes that are evaluated together.
 const CHUNK: usize = 32;
 
-/// Nodes on one law that wait until they are asked.
+/// Nodes on one law that wait to be evaluated.
 pub struct Bound {
     count: usize,
     law: usize,

@@ -2,7 +2,7 @@
 
 use crate::patch_nodes::Plane;
 
-/// Points along each side of a cell at which an underside with an edge is looked at.
+/// Points along each side of a cell at which an underside with an edge is sampled.
 const SAMPLES: usize = 4;
 const POINTS: usize = SAMPLES * SAMPLES;
 /// Distance of the outermost of them from the node, in cells.

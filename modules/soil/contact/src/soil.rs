@@ -215,7 +215,7 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
-/// Size of a contact for which a law is looked at before there is any, m.
+/// Size of a contact for which a law is checked before there is any, m.
 const TYPICAL_SIZE: f64 = 0.1;
 
 /// The laws of the scenario's own soil and of those of the mask.

@@ -123,7 +123,7 @@ const LEAST_MEAN: f64 = 1.0 / 3.0;
 /// Places of Gauss and Legendre's two points in a range from 0 to 1; both weigh alike.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Depths at which a pressure is looked at for its mean over a cell.
+/// Depths at which a pressure is evaluated for its mean over a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
     /// Both depths, m.

@@ -197,7 +197,7 @@ pub struct Beside<'a> {
     pub wedge: f64,
 }
 
-/// Cells over which the loose soil on a wedge is looked at, at most.
+/// Cells over which the loose soil on a wedge is measured, at most.
 const MOST_CELLS: i32 = 32;
 
 impl Beside<'_> {

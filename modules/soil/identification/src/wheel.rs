@@ -190,7 +190,7 @@ fn rim(wheel: &Wheel, x: &[f64], slip: f64) -> Rim {
     }
 }
 
-/// Stiffness with which soil of this law springs back where nobody gives it, Pa/m.
+/// Default stiffness with which soil of this law springs back, Pa/m.
 fn unloading(k_phi: f64, n: f64) -> f64 {
     // a built-in law always answers
     PressureLaw::Bekker(Bekker { k_c: 0.0, k_phi, n }).unloading().unwrap_or(f64::INFINITY)

@@ -6,7 +6,7 @@ use crate::{PressureLaw, SoilExpressions};
 use serde_json::{Map, Value};
 use terraglue_subsystem::{Advice, Config};
 
-/// Depth up to which nobody minds that the elastic line stands for the law, m.
+/// Depth up to which the elastic line may replace the law without advice, m.
 const UNNOTICED: f64 = 1e-4;
 /// Relative difference of gravities from which on they are different ones.
 const SAME_GRAVITY: f64 = 0.01;

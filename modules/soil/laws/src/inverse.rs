@@ -3,7 +3,7 @@
 
 use terraglue_subsystem::Result;
 
-/// Smallest depth at which a law is looked at, m.
+/// Smallest depth at which a law is evaluated, m.
 const SHALLOWEST: f64 = 1e-9;
 /// Largest depth at which a law is evaluated, m.
 const DEEPEST: f64 = 1e3;

@@ -10,8 +10,8 @@ use crate::shear::ShearLaw;
 use crate::strength::Strength;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// Density where a scenario is silent, kg/m³: the upper 15 cm of lunar soil (Carrier, Olhoeft and Mendell 1991, Lunar
-/// Sourcebook, table 9.4).
+/// Default density, kg/m³: the upper 15 cm of lunar soil (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table
+/// 9.4).
 pub const DEFAULT_DENSITY: f64 = 1500.0;
 
 /// Parameters of a soil; the names are the keys of a scenario and the columns of `models/soils.csv`.

@@ -82,8 +82,8 @@ impl PressureLaw {
         }
     }
 
-    /// Stiffness of unloading and reloading where nobody gives one, Pa/m: 4.4 times that of first loading down to 2 cm
-    /// under a contact of 5 cm, as Wong (1984) measured in sand.
+    /// Default stiffness of unloading and reloading, Pa/m: 4.4 times that of first loading down to 2 cm under a contact
+    /// of 5 cm, as Wong (1984) measured in sand.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.

@@ -1,4 +1,4 @@
-//! First loading goes on straight where a law that somebody wrote would be stiffer than unloading.
+//! First loading goes on straight where a user's law would be stiffer than unloading.
 //!
 //! Soil keeps the part of the work of first loading under its elastic line: ∫(1 − p'/k_u)·p dz becomes heat. Where p' > k_u
 //! this is negative, so that pressing and releasing would yield energy. The pressure is therefore the largest one below the
@@ -8,7 +8,7 @@
 pub(crate) const STIFFEST: f64 = 0.99;
 /// Lines of a law; the last one does not end.
 const LINES: usize = 3;
-/// Depths at which a law is looked at beyond the elastic limit, denser near 0.
+/// Depths at which a law is evaluated beyond the elastic limit, denser near 0.
 const DEPTHS: usize = 63;
 /// The deepest of them, m: no node remembers more.
 const DEEPEST: f64 = 1.0;

@@ -70,7 +70,7 @@ impl PairIndex {
     }
 }
 
-/// Poses that are looked at, at most.
+/// Poses that are evaluated, at most.
 const MOST_POSES: usize = 100_000;
 /// Local pairs that are tried, at least and at most.
 const LOCAL_PAIRS: [usize; 2] = [16, 60];

@@ -59,7 +59,7 @@ const NO_SLOPE: &str = "int fmi2GetDirectionalDerivative(Fmu *u, const unsigned 
 pub type Variable<'a> = (&'a str, char, f64);
 
 /// Builds an FMU that knows the derivative of its last output by its first input, `slope` in C, and counts in the output
-/// before it how often it was asked.
+/// before it how often it was evaluated.
 pub fn build_with_slope(
     folder: &Path,
     name: &str,

@@ -24,7 +24,7 @@ def say(*words):
 
 
 def experiment(path, most):
-    """Start, stop and step that the FMU wants, s, with at most so many steps, and whether events are handled; none where it is
+    """Default start, stop and step of the FMU, s, with at most so many steps, and whether events are handled; none where it is
     not of our kind."""
     with zipfile.ZipFile(path) as archive:
         names = [name.replace("\\", "/") for name in archive.namelist()]

@@ -11,7 +11,7 @@ use terraglue_tree_localisation::{
 
 /// Where the scanners of `synthetic` stand, m: 2 m above the ground.
 const EYE: [f64; 3] = [180.0, 120.0, 1.4053];
-/// Distance up to which stems are looked at, m.
+/// Distance up to which stems count, m.
 const WITHIN: f64 = 20.0;
 
 pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {

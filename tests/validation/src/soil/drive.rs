@@ -8,7 +8,7 @@ use terraglue_subsystem::{
     Geometry, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
 };
 
-/// Gap up to which ground below the body is looked at, m.
+/// Gap up to which ground below the body counts, m.
 const MARGIN: f64 = 5e-3;
 
 /// Vertical load or motion in a step.

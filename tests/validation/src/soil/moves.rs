@@ -231,7 +231,7 @@ fn laid(k: u32, load: f64) -> f64 {
 
 const BALANCED: [&str; 4] = ["lunar_nominal", "LETE_sand", "snow_US_Harrison", "clayey_Thai38"];
 
-/// Script, soil, module, shape and spacing of a run whose balance is looked at.
+/// Script, soil, module, shape and spacing of a run whose balance is checked.
 type BalancedCase = (usize, &'static str, Maker, usize, f64);
 
 /// Error of the balance of energies of such a run over the path of the work, and the largest fall of its heat in a step, J.

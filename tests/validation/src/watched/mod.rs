@@ -1,4 +1,4 @@
-//! Figures of the page of a run: that watching changes nothing and holds nobody up, the speed of the past, the cost of the ground, and
+//! Figures of the page of a run: that watching changes nothing and delays no run, the speed of the past, the cost of the ground, and
 //! how the page draws in a real browser. Without a browser or the Python packages of the tests their lines have `skip`.
 
 use crate::process::{Outcome, command, root, target};

@@ -83,7 +83,7 @@ fn by_loader(path: &Path, ending: &str, bytes: &mut [u8]) -> Result<Mesh, String
     mesh.finish()
 }
 
-/// Corners as they stand in a text, without triangles.
+/// Corners as listed in a text, without triangles.
 pub(crate) fn corners_of(numbers: &[f64]) -> Mesh {
     let points = numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     Mesh { points, triangles: Vec::new() }

@@ -98,7 +98,7 @@ fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
 
 /// Walks, and collects the figures of feet and forces.
 fn walked(walk: &mut GaitWalk) -> Outcome<SeenWalk> {
-    // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
+    // Bodies are in the order of the legs' joints, four to a leg, after the trunk.
     let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
     let normals = LEGS.map(|leg| walk.fixture.id(&format!("{leg}4.contact_normal")));
     let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;

@@ -1,4 +1,4 @@
-//! Rapier's column: a small program of its own workspace, built here when it is first asked for.
+//! Rapier's column: a small program of its own workspace, built here on its first use.
 
 use super::reference;
 use crate::process::{Outcome, cargo, command as start, root, target};

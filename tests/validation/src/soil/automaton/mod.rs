@@ -19,7 +19,7 @@ pub use picture::write_picture;
 use crate::process::Outcome;
 use crate::{Context, Figure};
 
-/// κ_max where a scenario is silent, 1/m.
+/// Default of κ_max, 1/m.
 const CURVATURE: f64 = 40.0;
 
 /// All figures but those that a clock measures.

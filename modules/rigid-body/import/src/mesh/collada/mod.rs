@@ -1,8 +1,8 @@
-//! COLLADA 1.4 and 1.5 (`.dae`): the triangles of the scene, each part as often as it stands there.
+//! COLLADA 1.4 and 1.5 (`.dae`): the triangles of the scene, each part as often as it is instantiated.
 //!
 //! Transforms of nodes and `<unit meter="…">` count. `<up_axis>` does not: RViz, Gazebo and MoveIt take coordinates as they
-//! stand, and robot files are made to look right there. Elements without triangles of their own (skins, splines,
-//! references to other files) are refused by their line; materials, lights and cameras are ignored.
+//! are, and robot files are made to look right there. Elements without triangles of their own (skins, splines, references
+//! to other files) are refused by their line; materials, lights and cameras are ignored.
 
 mod geometry;
 

@@ -1,8 +1,8 @@
 //! Terminals of FMI 3.0: the variables of a body, of a joint, and those of driven feet, as they plug into another FMU.
 //!
-//! Joints (`org.terraglue.joint`) are reported by the subsystem itself, their members with the names of their variables. A group `NAME.x`, `NAME.y`,
-//! `NAME.z` is a body (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet (`org.terraglue.feet`, a row per foot). Members are
-//! matched by their names.
+//! Joints (`org.terraglue.joint`) come from the subsystem itself, with the names of their variables. A group `NAME.x`, `NAME.y`, `NAME.z` is a body
+//! (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet (`org.terraglue.feet`, a row per foot). Members are matched by their
+//! names.
 
 use super::Layout;
 use super::xml::Xml;

@@ -263,8 +263,7 @@ impl Estimator {
     }
 
     /// Motion of all held components equals the partner's; the proximal point nearest to the present T. Slipping
-    /// components follow the normal force of their port where that can be solved, and stay put otherwise. False: there
-    /// is none.
+    /// components follow the normal force of their port where that can be solved, else stay. False: there is none.
     fn solve_held(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
         let n = p.gap.len();
         self.unknowns.clear();
@@ -302,8 +301,7 @@ impl Estimator {
         !self.unknowns.iter().any(|i| self.epsilon[*i] == IMMOBILE_REGULARISATION)
     }
 
-    /// Factorises the system with slipping components that follow their normals: as it is (true), or with ε; none
-    /// where it is singular.
+    /// Factorises the system with slip that follows the normals: as it is (true), or with ε; none where it is singular.
     fn factor_slipping(&mut self, p: &Problem) -> Option<bool> {
         let (n, m) = (p.gap.len(), self.unknowns.len());
         if self.mobile() {

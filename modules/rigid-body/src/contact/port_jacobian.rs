@@ -1,7 +1,6 @@
 //! dX, dV and dA/d(wrench on itself) of a trial at ports of glued joints, as exact as its Newton iteration needs them.
 //!
-//! Contacts alone take [`Ports::compliance`] instead: within a step their soils deflect far more than the terms left
-//! out.
+//! Contacts alone take [`Ports::compliance`] instead: their soils deflect far more than the terms left out.
 
 use super::ports::{Ports, response};
 use crate::dynamics::Dynamics;

@@ -26,8 +26,8 @@ pub struct Underside {
     pub steeper: f64,
 }
 
-/// The planes that meet in a cell. The envelope faces as its part in the soil does: the faces of a wedge that are in the soil press it, not
-/// those above.
+/// The planes that meet in a cell. The envelope faces as its part in the soil does: the faces of a wedge in the soil press it, not those
+/// above.
 pub struct Fold {
     planes: [Plane; FACES],
     count: usize,

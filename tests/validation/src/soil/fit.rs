@@ -1,5 +1,4 @@
-//! Real plates: the laws fitted to the presses of two discs into Direct-90 sand, and predictions of one box by the
-//! other.
+//! Real plates: the laws fitted to presses of two discs into Direct-90 sand, and predictions of one box by the other.
 
 use crate::process::{Outcome, root};
 use crate::{Context, Figure, Limit};

@@ -46,8 +46,7 @@ impl<'a> Shapes<'a> {
         }
     }
 
-    /// All shapes of a link in its own frame; one both seen and hit appears once. `still`: the link is the
-    /// world.
+    /// All shapes of a link in its own frame; one both seen and hit appears once. `still`: the link is the world.
     pub fn of(&mut self, link: &Link, still: bool) -> Result<Vec<Shape>, Error> {
         let mut shapes: Vec<Shape> = Vec::new();
         for c in &link.collision {

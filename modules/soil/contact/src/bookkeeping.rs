@@ -516,8 +516,7 @@ fn kept_by_law(curve: &PressureCurve) -> bool {
     curve.keeper().is_some()
 }
 
-/// Node k at the mean depth `depth` (m) under a pressure (Pa), its soil not yet set, and the vertical depth of the underside there,
-/// m.
+/// Node k at the mean depth `depth` (m) under a pressure (Pa), its soil not yet set, and the vertical depth of the underside there, m.
 fn covered(n: &PatchNodes, k: usize, [depth, pressure]: [f64; 2], n_z: f64) -> (Covered, f64) {
     let mean = (depth + relief(n, k)) / n_z;
     let deep = mean + n.spread[k].below / n_z;

@@ -1,4 +1,4 @@
-//! What the examples share: where the scenarios and the modules of the repository are.
+//! Helpers of the examples: paths of the repository's scenarios and modules.
 
 use std::path::PathBuf;
 use terraglue::testbed::Options;

@@ -18,7 +18,7 @@ use std::time::Duration;
 use terraglue::scenario::Scenario;
 use terraglue::signals::VariableRef;
 
-/// Wall time after which Python is asked for signals such as Ctrl-C.
+/// Wall time after which Python checks for signals such as Ctrl-C.
 const SLICE: Duration = Duration::from_millis(50);
 
 /// One of the testbeds.

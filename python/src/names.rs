@@ -20,7 +20,7 @@ pub fn find_all(py: Python<'_>, testbed: &Testbed, names: &[String]) -> PyResult
     names.iter().map(|name| find(py, testbed, name)).collect()
 }
 
-/// What is known of a variable.
+/// Description of a variable.
 pub fn describe<'a>(py: Python<'_>, testbed: &'a Testbed, name: &str) -> PyResult<&'a Variable> {
     Ok(find(py, testbed, name)?.describe(testbed.instances()))
 }

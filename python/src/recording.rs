@@ -1,4 +1,4 @@
-//! `Recording`: what a run has written, as arrays.
+//! `Recording`: the recorded values of a run as arrays.
 
 use crate::errors;
 use crate::ground::{Heights, arrays};
@@ -55,7 +55,7 @@ impl Recording {
         self.0.header.get("scenario_text")
     }
 
-    /// What happened: times (s) and words.
+    /// Events: times (s) and words.
     #[getter]
     fn events(&self) -> Vec<(f64, String)> {
         self.0.events.iter().map(|event| (event.t_s, event.what.clone())).collect()

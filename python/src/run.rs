@@ -1,4 +1,4 @@
-//! A testbed with what belongs to it: its scenario, its recording, the states that it keeps.
+//! A testbed with its scenario, its recording, and the states that it keeps.
 
 use crate::snapshot::Places;
 use std::path::{Path, PathBuf};

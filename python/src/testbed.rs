@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use terraglue::Result;
 
-/// Wall time after which Python is asked for signals such as Ctrl-C.
+/// Wall time after which Python checks for signals such as Ctrl-C.
 const SLICE: Duration = Duration::from_millis(50);
 
 /// A running scenario: a file, the name of one that comes with the package, or a dictionary.
@@ -44,7 +44,7 @@ impl Testbed {
         }
     }
 
-    /// Steps in slices of wall time, between which Python is asked for signals, until nothing is left.
+    /// Steps in slices of wall time, between which Python checks for signals, until all are done.
     fn in_slices(
         &self,
         py: Python<'_>,
@@ -115,7 +115,7 @@ impl Testbed {
         self.with(py, |py, run| Ok(names::describe(py, &run.testbed, name)?.unit.clone()))
     }
 
-    /// What a variable is.
+    /// Meaning of a variable.
     fn help(&self, py: Python<'_>, name: &str) -> PyResult<String> {
         self.with(py, |py, run| Ok(names::describe(py, &run.testbed, name)?.help.clone()))
     }

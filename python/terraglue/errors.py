@@ -1,4 +1,4 @@
-"""What can go wrong. All are `Error`; each is also what Python programs expect."""
+"""Exceptions. All are `Error`; each also derives from the built-in type that Python programs expect."""
 
 
 class Error(Exception):

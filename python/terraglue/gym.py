@@ -34,7 +34,7 @@ class Task:
     observe: Sequence[str]
     #: Variables that are set.
     act: Sequence[Action]
-    #: Place along the way, m: what is gained is the difference from the start.
+    #: Place along the way, m: the gain is the difference from the start.
     distance: str
     #: Angles whose magnitude beyond `fallen_rad` is a fall.
     tilt: Sequence[str]

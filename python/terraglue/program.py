@@ -1,4 +1,4 @@
-"""Commands of the program, for what the package has no function of its own."""
+"""Commands of the program, for tasks without a function of the package."""
 
 import json
 import subprocess
@@ -8,7 +8,7 @@ from .paths import PROGRAM
 
 
 def run(*arguments, cwd=None):
-    """Runs `terraglue ARGUMENTS…` and returns what it prints, read where that is JSON.
+    """Runs `terraglue ARGUMENTS…` and returns its output, parsed where it is JSON.
 
         terraglue.run("compare", scenario, "--strategies", "cooperative,iterative", "--json")
         terraglue.run("fit-soil", "plates.csv", "--law", "bekker", "--json")

@@ -10,7 +10,7 @@ class Soil:
     """Feet of one shape on deformable soil.
 
     `position` (n, 3) is where the feet are at the start. Each `step` moves them on straight lines to new poses, which they reach after
-    `step_s`, and returns the wrenches of the ground on them, in world axes, moments about their origins. What happened is kept; `snapshot`
+    `step_s`, and returns the wrenches of the ground on them, in world axes, moments about their origins. The new state is kept; `snapshot`
     and `restore` go back, `trial` looks without keeping.
 
         soil = Soil([[0.0, 0.0, 0.05]], module="soil-bekker", parameters="LETE_sand", radius_m=0.05)

@@ -10,7 +10,7 @@ import pytest
 
 ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# what the driver itself writes when a picture is taken
+# messages of the driver itself when a picture is taken
 KNOWN = ("GPU stall due to ReadPixels", "GL Driver Message")
 
 
@@ -35,7 +35,7 @@ def browser():
 
 @contextmanager
 def opened(**context):
-    """A new page; what it writes to its console as an error fails the test."""
+    """A new page; an error on its console fails the test."""
     room = browser().new_context(**context)
     page = room.new_page()
     # a machine may be busy with other tests
@@ -51,7 +51,7 @@ def opened(**context):
 
 
 def ready(page):
-    """Waits until the page shows what it was opened for."""
+    """Waits until the page shows its content."""
     page.wait_for_function("document.documentElement.dataset.ready", timeout=60_000)
 
 

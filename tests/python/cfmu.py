@@ -34,7 +34,7 @@ int fmi2DoStep(Fmu *u, double t, double h, int p) { double *r = u->r; int *i = u
 
 def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags="", depends=None):
     """The FMU `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
-    of its own, `flags` attributes of <CoSimulation>; `depends` the places of what the outputs depend on, from 1; none: they depend on everything."""
+    of its own, `flags` attributes of <CoSimulation>; `depends` the places of the variables that the outputs depend on, from 1; none: all of them."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
     (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step, "more": more})
     command = ["cc", "-shared", "-fPIC", "-w", f"{name}.c", "-o", f"{name}.so", "-lm"]

@@ -1,4 +1,4 @@
-"""Figures of our own simulations that stand in sentences: of README, docs/ and the headers of scenarios.
+"""Figures of our own simulations that sentences quote: in README, docs/ and the headers of scenarios.
 
 Each claim names a file, its words with `{}` where a figure stands, and what measures it: a figure of tests/figures.tsv
 (which `cargo xtask validate --quick --check-docs` holds against a measurement), or a run. A block between two marks is
@@ -35,7 +35,7 @@ class Claim(NamedTuple):
         return re.compile(FIGURE.join(parts))
 
     def found(self, text):
-        """The place of the words, which stand there once."""
+        """The place of the words, which occur once."""
         places = list(self.pattern().finditer(text))
         if len(places) != 1:
             raise AssertionError(f"{self.file}: `{self.words}` stands there {len(places)} times, not once")
@@ -61,11 +61,11 @@ def printed(shown, measured):
     return text.replace("-", "−") if "−" in shown else text
 
 
-# What measures.
+# Measures.
 
 @functools.cache
 def rows():
-    """Names of the figures of tests/figures.tsv, their values and what they are."""
+    """Names of the figures of tests/figures.tsv, their values and meanings."""
     with (ROOT / "tests/figures.tsv").open() as table:
         found = csv.DictReader(table, delimiter="\t", quoting=csv.QUOTE_NONE)
         return {row["id"]: (float(row["value"]), row["what"]) for row in found if row["value"] != "-"}
@@ -260,7 +260,7 @@ def stiffness():
     return text
 
 
-# (file, name of the marks) → what makes it
+# (file, name of the marks) → function that makes it
 BLOCKS = {("docs/gluing.md", "moon_walk"): strategies, ("docs/gluing.md", "stiffness"): stiffness}
 
 

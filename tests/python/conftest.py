@@ -10,14 +10,14 @@ from contextlib import contextmanager
 
 import pytest
 
-# A temporary folder of their own: tests look at what is left behind, and not at what other programs leave.
+# A temporary folder of their own: tests look at files left behind, and not at those of other programs.
 TEMPORARY = tempfile.mkdtemp(prefix="terraglue-tests-")
 os.environ["TMPDIR"] = TEMPORARY
 tempfile.tempdir = TEMPORARY
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("TERRAGLUE_BIN", str(ROOT / "target" / "debug" / "terraglue"))
-# What new folders say to type calls the program by its name.
+# The commands that new folders suggest call the program by its name.
 os.environ["PATH"] = os.pathsep.join([os.path.dirname(os.path.abspath(PROGRAM)), os.environ["PATH"]])
 MOON_WALK = ROOT / "scenarios" / "moon_walk.toml"
 
@@ -57,7 +57,7 @@ def short_run(tmp_path_factory):
 
 @pytest.fixture
 def edited(tmp_path):
-    """Writes moon_walk with one replacement beside links to models; returns its path."""
+    """Writes moon_walk with one replacement next to links to models; returns its path."""
 
     def edit(old, new):
         text = MOON_WALK.read_text()

@@ -1,4 +1,4 @@
-"""The commands that stand in pages, in headers of scenarios and in `--help`, and what is needed to run them as they stand.
+"""The commands of pages, of headers of scenarios and of `--help`, and the files needed to run them as they are.
 
 A *command* is a line of a ```sh block (or of one without a language that begins with `terraglue` or `cargo`), or a code span that
 begins with one of the two. With a placeholder in it (`terraglue check FILE`, `terraglue fmu run | info | check`) or alone (`terraglue
@@ -25,7 +25,7 @@ PAGES += sorted(str(p.relative_to(ROOT)) for p in (ROOT / "scenarios").glob("*.t
 HELPS = ["", "run", "compare", "sweep", "report", "check", "check-module", "modules", "variables", "fmu run", "fmu info", "fmu check", "export",
          "convert", "new", "fit-soil", "robot", "soils"]
 
-# What is not run, by its beginning, and why. What stands here and in no page is an error, too.
+# Commands that are not run, by their beginning, and why. An entry that no page has is an error, too.
 NOT_RUN = {
     "cargo xtask test": "is what runs this test",
     "cargo xtask ci": "runs this test, too",
@@ -140,7 +140,7 @@ def reason_not_run(command):
 
 
 def form_is_wrong(command, helps):
-    """What does not exist of a form, or of a command that is not run."""
+    """The missing part of a form, or of a command that is not run."""
     text = re.sub(r"^(?:[A-Z_]+=\S+ )+", "", command.text)
     text = text.split(" -- ")[0] if text.startswith("cargo test") else text
     if text.startswith("cargo xtask"):
@@ -172,7 +172,7 @@ def cargo_is_wrong(text):
 
 
 def shortened(line):
-    """What is typed for a line: runs are short and do not settle, a comparison of all strategies is one of two, modules get the quick
+    """The command typed for a line: runs are short and do not settle, a comparison of all strategies is one of two, modules get the quick
     tests, `cargo run` is the program."""
     parts = [short(re.sub(r"^cargo run (?:--release )?-- ", "terraglue ", part.strip())) for part in line.split("&&")]
     return " && ".join(parts)
@@ -194,7 +194,7 @@ def short(part):
     return part.replace("--set event=[] ", "--set 'event=[]' ")
 
 
-# Files that a reader brings along, by the names that the pages give them: each is put where a command wants it.
+# Files that a reader brings along, by the names that the pages give them: each is put where a command needs it.
 def copied(source):
     return lambda place, name: shutil.copy(ROOT / source, place / name)
 
@@ -252,7 +252,7 @@ STOCK = {
 
 
 def brought(place, line):
-    """Puts there what the line wants and no command before it has made."""
+    """Provides the files that the line needs and no earlier command has made."""
     words = shlex.split(line)
     # tests that a fit has not seen are of the kind that it has
     other = STOCK["wheel.csv" if "--wheel" in words else "plates.csv"]
@@ -270,7 +270,7 @@ def copy_of_the_repository(folder):
 
 
 def beside(name):
-    """A program of the workspace that is built beside `terraglue`."""
+    """A program of the workspace that is built next to `terraglue`."""
     program = pathlib.Path(PROGRAM).resolve().parent / name
     assert program.is_file(), f"{program} is not there: `cargo build --workspace` makes it"
     return program

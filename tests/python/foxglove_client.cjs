@@ -1,5 +1,5 @@
-// The client library of Foxglove and Lichtblick against a run that is served: what a viewer does first, told as JSON.
-// node foxglove_client.cjs ADDRESS, with @foxglove/ws-protocol and ws beside it.
+// The client library of Foxglove and Lichtblick against a run that is served: the first steps of a viewer, printed as
+// JSON. node foxglove_client.cjs ADDRESS, with @foxglove/ws-protocol and ws next to it.
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const WebSocket = require("ws");
 

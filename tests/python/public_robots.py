@@ -1,4 +1,4 @@
-"""Reads the robots that Python packages carry, beside an oracle: Pinocchio for URDF, MuJoCo for MJCF.
+"""Reads the robots of Python packages and compares them with an oracle: Pinocchio for URDF, MuJoCo for MJCF.
 
 The commands stand in docs/robots.md, whose table `--write` makes.
 
@@ -43,7 +43,7 @@ NO_ROBOTS = re.compile(
     r"|pybullet_data/(?!.*(laikago|quadruped|racecar|husky|kuka|r2d2|franka|humanoid|biped|hexapod|atlas|cassie|xarm|aliengo|a1|pr2|mini_cheetah|mjcf/))"
 )
 
-# Why a robot may be refused, and what that says; none else.
+# Why a robot may be refused, and the reason in words; none else.
 REASONS = {
     r"there is no such file": "names meshes that the package does not carry",
     r"has no mass; give it|has no mass at all": "moves a link without mass",
@@ -96,7 +96,7 @@ def terraglue(path, *more):
 
 @contextlib.contextmanager
 def quiet():
-    """Silences what libraries write past Python."""
+    """Silences output that libraries write past Python."""
     with open(os.devnull, "w") as null:
         kept = [os.dup(1), os.dup(2)]
         os.dup2(null.fileno(), 1), os.dup2(null.fileno(), 2)
@@ -115,7 +115,7 @@ def by_pinocchio(path, ours):
     text = path.read_text()
     if "xmlns:xacro" in text:
         text = expanded(path)
-    # Urdfdom wants limits where the reader does not, and no byte order mark.
+    # Urdfdom requires limits where the reader does not, and no byte order mark.
     with quiet():
         if ours["base"] == "free":
             model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
@@ -142,7 +142,7 @@ def by_mujoco(path, _ours):
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    # What is moved by hand (mocap) stands still for us.
+    # Bodies moved by hand (mocap) stand still for us.
     still = {b for b in range(model.nbody) if model.body_weldid[b] == 0 or model.body_mocapid[model.body_rootid[b]] >= 0}
     moving = [b for b in range(1, model.nbody) if b not in still and model.body_mass[b] > 0]
     mass = sum(model.body_mass[b] for b in moving)
@@ -158,7 +158,7 @@ def by_mujoco(path, _ours):
 
 
 def differences(ours, oracle):
-    """What is not as the oracle has it."""
+    """Deviations from the oracle."""
     import numpy as np
 
     bodies, joints, mass, com, inertia = oracle
@@ -180,7 +180,7 @@ def differences(ours, oracle):
 
 
 def kinds(warnings):
-    """Warnings in a few words, without what depends on the file."""
+    """Warnings in a few words, without parts that depend on the file."""
     words = [
         ("counts as part of", "fixed links merged"),
         ("that of its shapes", "inertia of the shapes used"),
@@ -201,7 +201,7 @@ def unwrapped(message):
 
 
 def tried(path, kind):
-    """Verdict (agrees, refused, WRONG or no oracle), what to say, and the robot."""
+    """Verdict (agrees, refused, WRONG or no oracle), its text, and the robot."""
     done = terraglue(path)
     if done.returncode == 2 and "no mass and cannot move" in unwrapped(done.stderr):
         done = terraglue(path, "--fixed-base")

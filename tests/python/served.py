@@ -29,7 +29,7 @@ def served(what, *arguments):
 
 
 class Refused(Exception):
-    """The run does not do what was asked."""
+    """The run refused the request."""
 
 
 class Client:

@@ -63,5 +63,5 @@ def test_a_sudden_load_sinks_as_the_equation_of_motion_says(tmp_path, strategy):
         assert abs(summary["energy_balance_j"]) < 1e-3 * MASS * GRAVITY * deepest(share), summary["energy_balance_j"]
         found[share] = summary["max_sinkage_m"]
         assert found[share] == pytest.approx(deepest(share), rel=0.02), share
-    # what moves with the foot takes momentum: the overshoot falls
+    # the soil that moves with the foot takes momentum: the overshoot falls
     assert found[0.0] > found[1.0] > found[5.0]

@@ -20,7 +20,7 @@ LIMIT_S = 20
 # ---------------------------------------------------------------------------------------------------------------------
 # Tables: input, exit code, words that must appear.
 
-# What follows `check WALK --set`.
+# Arguments after `check WALK --set`.
 SETS = [
     ("gluing.strategy", 2, "there is no `=`"),
     ("gluing.strategy=newton", 2, "unknown strategy `newton`"),
@@ -144,7 +144,7 @@ TEXTS = [
     ("[time]\nduration_s = 1.0\n[\"a.b\"]\nmodule = \"gait\"\n", 2, "no name for a subsystem"),
 ]
 
-# A robot file as text: put beside the scenario.
+# A robot file as text: put next to the scenario.
 ROBOTS = [
     ("", "robot"), ("<robot", "robot"), ("<robot name='a'/>", "robot"), ("<mujoco/>", "robot"), ("<html/>", "robot"),
     ("<robot name='a'>" + "<link>" * 5000, "robot"),
@@ -319,7 +319,7 @@ def test_what_may_not_be_read(place):
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Found by a second look: each of these passed in silence, hung, or said no way out.
+# Found by a second look: each of these passed in silence, hung, or offered no way out.
 
 SECOND_SETS = [
     ("recording.include=[\"nothing.*\"]", 2, "`include` names no variable"),
@@ -478,7 +478,7 @@ THIRD_ROBOTS = [
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# A fourth look: what modules and the terrain say of a value stands where the value does.
+# A fourth look: complaints of modules and the terrain about a value point to the value.
 
 CRATER = 'terrain={kind="crater",size_m=[6,4],spacing_m=0.02,diameter_m=1.0,depth_m='
 FOURTH_SETS = [
@@ -581,7 +581,7 @@ def test_options_of_fmus_that_are_wrong(place):
     rows = [(words, ["fmu", "run", unit, *options, *apart], 2, words, place) for words, options in rows for apart in ([], ["--isolate"])]
     faults = attack(rows)
     assert not faults, "\n\n".join(faults)
-    # what is refused before the first row leaves no table behind
+    # a run that is refused before the first row leaves no table behind
     done = terraglue("fmu", "run", unit, "--output", "nothing", "--csv", place / "unmade.csv")
     assert done.returncode == 2 and not (place / "unmade.csv").exists()
 

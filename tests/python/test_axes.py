@@ -1,4 +1,4 @@
-"""The axes of reports: a value, its prefix and its unit say together what was recorded."""
+"""The axes of reports: a value, its prefix and its unit together give the recorded quantity."""
 
 
 import pytest

@@ -1,4 +1,4 @@
-"""What ended in a panic, a hang, a lost run or a message that leads astray stays mended."""
+"""Faults that ended in a panic, a hang, a lost run or a misleading message stay mended."""
 
 import json
 import os
@@ -66,7 +66,7 @@ def test_grounds_that_fit_no_memory_are_refused(command, edit, tmp_path):
     assert process.returncode == 2 and time.monotonic() - begin < 10
     for words in ("size_m", "spacing_m", "nodes", "GB of memory", "5e7", "fits this size"):
         assert words in told, told
-    # what it advises is taken; waves may be too short for it
+    # its advice is taken; waves may be too short for it
     fits = told.split("`spacing_m` = ")[-1].split(" fits")[0]
     flat = ["--set", 'terrain={kind="flat",size_m=[6.0,4.0],spacing_m=0.01}']
     again = terraglue("check", MOON_WALK, *flat, "--set", edit, "--set", f"terrain.spacing_m={fits}")

@@ -1,4 +1,4 @@
-"""The soil in C: built with the system's compiler, it walks; when it breaks mid-run, the run says so."""
+"""The soil in C: built with the system's compiler, it walks; when it breaks mid-run, the run reports it."""
 
 import json
 import os

@@ -15,7 +15,7 @@ SAME = ["recording.mcap", "variables.csv", "final_ground.asc", "exchange.json", 
 MEASURED = {"wall_s", "cpu_s", "real_time_factor", "cpu_real_time_factor", "cpu_per_step_s"}
 SMALL = ["--duration", "0.4", "--set", "time.settle_s=0.1", "--set", "terrain.size_m=[2.0,1.6]",
          "--set", "terrain.spacing_m=0.02", "--csv", "--quiet"]
-# What has happened before the first checkpoint, at 0.13 s, and what comes after it.
+# Events and faults before the first checkpoint, at 0.13 s, and after it.
 TIME_LINE = """
 [[event]]
 at_s = 0.05
@@ -41,7 +41,7 @@ CASES = [
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory):
-    """The walk with a time line, beside a robot file of its own."""
+    """The walk with a time line, next to a robot file of its own."""
     folder = tmp_path_factory.mktemp("walk")
     shutil.copytree(ROOT / "models", folder / "models")
     text = MOON_WALK.read_text().replace("../models/", "models/")
@@ -50,7 +50,7 @@ def walk(tmp_path_factory):
 
 
 def end_after_a_checkpoint(out, how, *arguments):
-    """Runs at the pace of the clock, so that what is left takes longer than to see that the file is there."""
+    """Runs at the pace of the clock, so that the rest takes longer than noticing the file."""
     command = [PROGRAM, "run", *map(str, arguments), "--out", str(out), "--checkpoint-every", "130ms", "--realtime"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT)
     while not (out / "checkpoint.bin").exists():
@@ -149,7 +149,7 @@ def test_only_the_same_run_goes_on(walk, tmp_path):
     assert process.returncode != 0 and "recording.mcap" in process.stderr
     assert (out / "recording.mcap").read_bytes() == damaged
     (out / "recording.mcap").write_bytes(before)
-    # the scenario of the run is in the checkpoint: its file may say something else by now
+    # the scenario of the run is in the checkpoint: its file may have changed by now
     aside = walk.rename(walk.with_suffix(".aside"))
     resumed = terraglue("run", "--resume", out, "--quiet")
     aside.rename(walk)

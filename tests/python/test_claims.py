@@ -1,4 +1,4 @@
-"""The figures that stand in sentences are those that are measured (`claims.py`)."""
+"""The figures quoted in sentences are those that are measured (`claims.py`)."""
 
 import re
 
@@ -48,7 +48,7 @@ def test_a_figure_that_has_changed_is_found_and_written():
 
 
 def test_scenarios_say_no_figure_that_nobody_measures():
-    """Headers of scenarios: a number with a unit of what comes out is a claim, or it is a number of the file or of its models."""
+    """Headers of scenarios: a number with a unit that is a result is a claim, or it is a number of the file or of its models."""
     loose = []
     for path in sorted((ROOT / "scenarios").glob("*.toml")):
         text = path.read_text()
@@ -63,7 +63,7 @@ def test_scenarios_say_no_figure_that_nobody_measures():
 
 
 def given(figure, keys):
-    """Whether a number stands in the keys and their comments."""
+    """Whether a number occurs in the keys and their comments."""
     return re.search(rf"(?<![\d.]){re.escape(figure)}0*(?![\d])", keys) is not None
 
 

@@ -1,4 +1,4 @@
-"""Event mode of FMI 3: periodic input clocks tick at their times, triggered ones when they are told to, output clocks are seen; events
+"""Event mode of FMI 3: periodic input clocks tick at their times, triggered ones on request, output clocks are seen; events
 inside a step are handled and marked."""
 
 import csv

@@ -319,7 +319,7 @@ def test_one_run_that_fails_fails_the_comparison_and_tells_its_own_reason(tmp_pa
     assert "error: 1 of 2 runs did not reach the end" in done.stderr and failed["error"] in done.stderr, done.stderr
 
 
-# What one of two values of a key is refused for: at its own place, by the module, and where another table is read.
+# Refusals of one of two values of a key: at its own place, by the module, and where another table is read.
 WRONG_VALUES = [
     (["soil.parameters=LETE_sand,LETE_sandd"], "LETE_sandd", "there is no soil `LETE_sandd`"),
     (["soil.n=-1,0.8"], "-1", "`n` = -1"),

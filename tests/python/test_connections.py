@@ -9,7 +9,7 @@ import pytest
 import cfmu
 from conftest import terraglue
 
-# All values of a type lie in one array, by reference; `twice` hands on what it gets, doubled or as it is.
+# All values of a type lie in one array, by reference; `twice` hands on its inputs, doubled or as they are.
 CODE = r"""
 #include <stdlib.h>
 typedef struct { double r[16]; int i[4], b[4]; const char *s[4]; char text[64]; } Fmu;

@@ -1,4 +1,4 @@
-"""`cargo xtask`: what it builds before it does what it is asked for. Cargo is replaced by a program that only says its arguments."""
+"""`cargo xtask`: the builds before each command. Cargo is replaced by a program that only prints its arguments."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""The archive for users runs where nothing else is: an empty environment, another folder, no source beside it."""
+"""The archive for users runs where nothing else is: an empty environment, another folder, no source next to it."""
 
 import json
 import os
@@ -57,7 +57,7 @@ def test_all_scenarios_find_their_modules(unpacked, tmp_path):
 
 @pytest.fixture
 def bare_root(unpacked, tmp_path):
-    """A root folder that holds the archive as /opt and the C library, with /proc, /dev/null and an empty /tmp: what the emptiest container offers."""
+    """A root folder that holds the archive as /opt and the C library, with /proc, /dev/null and an empty /tmp, like the emptiest container."""
     root = tmp_path / "root"
     files = [unpacked / "bin/terraglue", *(unpacked / "lib/terraglue").glob("*.so")]
     listed = subprocess.run(["ldd", *files], capture_output=True, text=True).stdout

@@ -1,6 +1,6 @@
-"""Every command that stands in a page, in the header of a scenario or in `--help` is typed as it stands, shortened as
-`documented.shortened` says, one after the other in a copy of the repository's scenarios and models. What is not run stands in
-`documented.NOT_RUN` with its reason; its options are held against `--help`, as those of forms with placeholders."""
+"""Every command in a page, in the header of a scenario or in `--help` is typed as it is, shortened by
+`documented.shortened`, one after the other in a copy of the repository's scenarios and models. Commands that are not run are in
+`documented.NOT_RUN` with their reasons; their options are held against `--help`, as those of forms with placeholders."""
 
 import functools
 import os
@@ -15,7 +15,7 @@ from conftest import PROGRAM, ROOT, terraglue
 
 @functools.cache
 def helps(program, path):
-    """What `--help` says of a subcommand; none: there is no such."""
+    """The `--help` of a subcommand; none: there is no such."""
     command = [PROGRAM if program == "terraglue" else documented.xtask(path), *path.split(), "--help"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     return done.stdout if done.returncode == 0 else None
@@ -39,7 +39,7 @@ passed = set()
 
 
 def typed(commands, folder):
-    """What goes wrong with the commands of a page, each with its place."""
+    """Failures of the commands of a page, each with its place."""
     place, wrong = documented.copy_of_the_repository(folder), []
     environment = {**os.environ, "HOME": str(folder / "home"), "XDG_CACHE_HOME": str(folder / "home/.cache")}
     for command in commands:
@@ -48,7 +48,7 @@ def typed(commands, folder):
             wrong += [f"{command.place}\n  {missing}"] if missing else []
             continue
         line = documented.shortened(command.text)
-        # what reads files of the repository alone and has passed on another page passes here
+        # a command that only reads files of the repository and has passed on another page passes here
         if line in passed:
             continue
         documented.brought(place, line)

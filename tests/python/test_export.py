@@ -178,7 +178,7 @@ set = {{ {values} }}
     with pytest.raises(FMICallException):
         instance["hinge.angle"] = 1.5  # beyond its limit
     with pytest.raises(FMICallException):
-        instance["arm.z"] = 1.0  # its joint says where it is
+        instance["arm.z"] = 1.0  # its joint determines its place
     instance.initialize({name.replace(".", "__"): value for name, value in wanted.items()})
     assert instance["base.z"][0] == 0.75 and abs(instance["hinge.angle"][0] - 0.6) < 1e-15
     with pytest.raises(FMICallException):

@@ -16,7 +16,7 @@ H = 0.1
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """An FMU whose output is the time, and one that keeps and integrates what it is told."""
+    """An FMU whose output is the time, and one that keeps and integrates its input."""
     folder = tmp_path_factory.mktemp("faults")
     build(folder, "time", [("y", "output", 0, "")], "r[0] = t + h;")
     sink = [("u", "input", 0, ""), ("seen", "output", 0, ""), ("sum", "output", 0, ""), ("free", "input", 2, "")]

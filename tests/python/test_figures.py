@@ -1,4 +1,4 @@
-"""The figures of a run tell what they say they do: energies, distances, prints; and the report shows them on any screen."""
+"""The figures of a run are those that they claim to be: energies, distances, prints; and the report shows them on any screen."""
 
 import base64
 import html.parser
@@ -106,7 +106,7 @@ def test_curves_of_contacts_have_the_names_and_colours_of_the_map(plates):
     figures = {figure["id"]: figure for figure in data["figures"]}
     for panel in figures["pressure"]["panels"] + figures["contacts"]["panels"] + figures["forces"]["panels"][:1]:
         assert {curve["name"]: curve["colour"] for curve in panel["curves"]} == {name: k for k, name in enumerate(legs)}
-    # which is which: the smaller plate bears more pressure on this soil
+    # which is which: on this soil the pressure below the smaller plate is larger
     last = {curve["name"]: floats(curve["y"])[-1] for curve in figures["pressure"]["panels"][0]["curves"]}
     assert last["small_plate"] > last["large_plate"]
 
@@ -236,7 +236,7 @@ def test_words_on_cards_are_no_larger_than_their_card(walk):
 
 
 def test_no_force_is_shown_before_the_first_step(walk):
-    """The soil bears the robot from the start; what nobody has told is not 0 N."""
+    """The soil bears the robot from the start; an unset input is not 0 N."""
     data = data_of(walk[1])
     figures = {figure["id"]: figure for figure in data["figures"]}
     total = figures["forces"]["panels"][1]["curves"][0]

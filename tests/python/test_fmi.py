@@ -22,7 +22,7 @@ VARIABLES = """<ModelVariables>
 <ScalarVariable name="mode" valueReference="2" causality="parameter"><Real start="0"/></ScalarVariable>
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>"""
 
-# x' = -k x by Euler's explicit rule; after t = 0.25 s it does what `mode` says: 1 NaN, 2 error, 3 fatal, 4 discards
+# x' = -k x by Euler's explicit rule; after t = 0.25 s it acts by `mode`: 1 NaN, 2 error, 3 fatal, 4 discards
 # steps longer than 0.1 s, 5 answers a status that does not exist.
 CODE = r"""
 #include <math.h>
@@ -161,7 +161,7 @@ def both_ways(fmu, tmp_path, more=""):
 
 @pytest.mark.parametrize(("macros", "step"), [(["SILENT"], ""), ([], "*last = NAN;"), (["SILENT"], "*early = true;")])
 def test_a_step_counts_as_made_where_the_fmu_does_not_say_how_far_it_came(tmp_path, macros, step):
-    """A value that it does write is looked at, and a step that it leaves early needs one."""
+    """A value that it does write is checked, and a step that it leaves early needs one."""
     fmu = cfmu.build_3(tmp_path, "silent", [("x", "output", "", ())], f"v[1][0] += h; {step}", macros=macros)
     alone, inside, last, end = both_ways(fmu, tmp_path)
     if step:

@@ -1,4 +1,4 @@
-"""Inputs that go on within a step: FMUs of FMI 3 ask for them, FMUs of FMI 2 are told their slopes; results are closed forms."""
+"""Inputs that go on within a step: FMUs of FMI 3 ask for them, FMUs of FMI 2 receive their slopes; results are closed forms."""
 
 import csv
 import math
@@ -278,7 +278,7 @@ int fmi3SetFloat32(Fmu *u, const unsigned *r, size_t k, const float *x, size_t m
 
 @pytest.mark.parametrize("event", [True, False])
 def test_after_an_early_return_the_input_is_of_that_time(tmp_path, event):
-    """A trial of the solver looks at the end of the step; then the FMU returns half-way. `x` is what it finds there."""
+    """A trial of the solver looks at the end of the step; then the FMU returns half-way. `x` is the value there."""
     step = r"""double half = t + h / 2;
 if (t == 0.375 && EVENT == 0) X = v[1][0];
 if (t == 0.25 && u->early) { Y += h / 2 * ask(u, t + h / 4); ask(u, t + h); *early = true; *event = EVENT; *last = half; return 0; }

@@ -9,8 +9,8 @@ from conftest import terraglue
 
 VARIABLES = [("x", "output", "", ()), ("y", "output", "", (2,)), ("mode", "parameter", "0", ()), ("calls", "output", "", ())]
 
-# x' = x in four inner steps, each shown; y = x, -x. From t = 0.5 s on `mode` says: 1 a NaN that only an inner step shows, 2 a time outside
-# the step, 3 early returns half-way, 4 one that never gets on, 5 ever smaller ones, 6 a call from another thread, 7 no places for
+# x' = x in four inner steps, each shown; y = x, -x. From t = 0.5 s on `mode` selects: 1 a NaN that only an inner step shows, 2 a time
+# outside the step, 3 early returns half-way, 4 one that never gets on, 5 ever smaller ones, 6 a call from another thread, 7 no places for
 # the answer, 8 values may not be read at odd inner steps.
 STEP = r"""int m = t >= 0.5 ? (int)v[3][0] : 0;
 if (m == 4) { *last = t; return *early = *event = true, 0; }

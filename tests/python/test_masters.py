@@ -96,8 +96,8 @@ def test_ecos_runs_a_soil(soil, wanted):
     assert run(ECOS, soil, *HEIGHTS, LD_LIBRARY_PATH=libraries) == pytest.approx(wanted, rel=1e-12)
 
 
-# A mass that falls on the soil: 2 kg, symplectic Euler. The signals are late by a step or two, which drives what is
-# elastic: its own damping must be larger.
+# A mass that falls on the soil: 2 kg, symplectic Euler. The signals are late by a step or two, which drives elastic
+# parts: their own damping must be larger.
 MASS = """
 from {package} import {names}
 class Mass({base}):

@@ -75,7 +75,7 @@ def test_a_new_scenario_stands(tmp_path, name):
     # it stands still from the start: nothing swings on its joints
     assert summary["peak_force_over_weight"] <= 1.1
     assert 0 < summary["max_sinkage_m"] < 0.03
-    # at rest next to nothing is turned over: rounding is held against the energy that stands in the sunken weight
+    # at rest next to nothing is turned over: rounding is compared with the energy of the sunken weight
     mass = json.loads(terraglue("robot", robot, "--json").stdout)["mass_kg"]
     sunken_j = 1.62 * mass * summary["max_sinkage_m"]
     assert abs(summary["energies"]["drift_j"]) < 1e-8 * sunken_j, summary["energies"]
@@ -84,7 +84,7 @@ def test_a_new_scenario_stands(tmp_path, name):
                        "--out", tmp_path / "coming", "--json")
     energies = json.loads(coming.stdout)["energies"]
     assert energies["turnover_j"] > 1e-5 and abs(energies["drift_j"]) < 1e-4 * energies["turnover_j"], energies
-    # joints stay where they started, within what the gains promise
+    # joints stay where they started, within the accuracy of the gains
     angles = {key[len("robot.") : -len(".angle")]: x for key, x in last.items() if key.endswith(".angle")}
     starts = dict(line.split(" = ") for line in text.split("[robot.joints]")[1].split("\n#")[0].split("\n") if " = " in line)
     starts = {joint.strip('"'): float(x) for joint, x in starts.items()}
@@ -104,9 +104,9 @@ def test_effort_of_the_file_bounds_the_motors(tmp_path):
     text = (tmp_path / "moon" / "scenario.toml").read_text()
     largest = text.split("[robot.max_torque]")[1].split("[report]")[0]
     assert '"shoulder" = 4.5\n' in largest, largest
-    # the file says nothing of this one: a value of its own, and why
+    # the file has no value for this one: a value of its own, and why
     assert re.search(r'"elbow" = [0-9.]+ +# 5 times what the weight asks\n', largest), largest
-    # motors that are too weak are told
+    # motors that are too weak are reported
     robot.write_text(with_limits.replace('effort="4.5"', 'effort="0.1"'))
     process = terraglue("new", "scenario", "--robot", robot, "-o", tmp_path / "weak")
     assert process.returncode == 0 and "`shoulder` (0.1 of " in process.stderr, process.stderr
@@ -133,7 +133,7 @@ def test_what_cannot_stand_is_told(tmp_path):
     assert process.returncode == 2 and "can touch" in process.stderr and "<collision>" in process.stderr
     process = terraglue("new", "scenario", "mine")
     assert process.returncode == 2 and "--robot" in process.stderr
-    # a centre of mass beside the only foot
+    # a centre of mass not above the only foot
     foot = shape('<sphere radius="0.03"/>', "0.5 0 -0.3")
     floating.write_text(f'<robot name="f">{LINK.format(name="a", com=0, mass=1, i=0.1, shape=foot)}</robot>')
     process = terraglue("new", "scenario", "--robot", floating, "-o", tmp_path / "moon")
@@ -145,7 +145,7 @@ def test_what_cannot_stand_is_told(tmp_path):
 
 
 def test_the_tutorial_walks_and_drives(tmp_path):
-    """What docs/your-robot.md says, with robots of our own whose joints are called as those in it."""
+    """The steps of docs/your-robot.md, with robots of our own whose joints are called as those in it."""
     page = (ROOT / "docs" / "your-robot.md").read_text()
     (controller,) = re.findall(r"```python\n(.*?)```", page, re.S)
     wheels, crawl = re.findall(r"```toml\n(.*?)```", page, re.S)
@@ -167,5 +167,5 @@ def test_the_tutorial_walks_and_drives(tmp_path):
     scenario.write_text(text)
     run = terraglue("run", scenario, "--duration", "3", "--out", tmp_path / "out2", "--json")
     assert run.returncode == 0, run.stderr
-    # 0.15 m/s at the rim, less what slips
+    # 0.15 m/s at the rim, less the slip
     assert 0.3 < json.loads(run.stdout)["distance_m"] < 0.45

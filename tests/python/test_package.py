@@ -30,7 +30,7 @@ PLATE = {
 
 
 def wheel(place):
-    """The wheel as pip builds it, of what the tests have built."""
+    """The wheel as pip builds it, from the build of the tests."""
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
     environment = {**os.environ, "TERRAGLUE_PROFILE": "debug"}
     done = subprocess.run([*pip, "wheel", "--no-deps", "-w", place, ROOT / "python"], env=environment, capture_output=True, text=True)
@@ -41,8 +41,8 @@ def wheel(place):
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    """The folder with the installed package. Building the wheel compiles for minutes, so it is put together of what the tests have built;
-    with TERRAGLUE_TEST_WHEEL=1 it is what the wheel holds."""
+    """The folder with the installed package. Building the wheel compiles for minutes, so it is put together from the build of the tests;
+    with TERRAGLUE_TEST_WHEEL=1 it is unpacked from the wheel."""
     place = tmp_path_factory.mktemp("package")
     folder = place / "site"
     if os.environ.get("TERRAGLUE_TEST_WHEEL"):
@@ -60,7 +60,7 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def tg(site):
-    """The package in this process; the modules of plugins have the same name and are asked for by other processes only."""
+    """The package in this process; the modules of plugins have the same name and are loaded by other processes only."""
     sys.path.insert(0, str(site))
     try:
         import terraglue
@@ -230,7 +230,7 @@ def test_threads_may_share_a_testbed(tg):
             for _ in range(20):
                 testbed.step()
                 testbed.read(["bevameter.small_press.angle"])
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is told below
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is reported below
             errors.append(error)
 
     threads = [threading.Thread(target=work) for _ in range(4)]
@@ -241,7 +241,7 @@ def test_threads_may_share_a_testbed(tg):
 
 def test_ctrl_c_ends_a_long_run(site, tmp_path):
     code = "import terraglue\nt = terraglue.Testbed('moon_walk', set={'time.duration_s': 1000.0})\nprint('ready', flush=True)\nt.run_until(1000.0)\n"
-    # what runs in the background of a shell has it ignored
+    # a process in the background of a shell has it ignored
     heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
     environment = {**os.environ, "PYTHONPATH": str(site)}
     process = subprocess.Popen([sys.executable, "-c", code], env=environment, preexec_fn=heard, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -1,4 +1,4 @@
-"""What an operator sees: the replay of a report, a picture of a run, and the page of a run that is going on, in a real browser."""
+"""The operator's view: the replay of a report, a picture of a run, and the page of a run that is going on, in a real browser."""
 
 import base64
 import os
@@ -60,7 +60,7 @@ def test_the_report_shows_the_robot_walking(walk):
 
 
 def steady(page, read):
-    """What is read once it does not change any more."""
+    """The value that is read once it does not change any more."""
     last = read()
     for _ in range(60):
         page.wait_for_timeout(500)

@@ -1,4 +1,4 @@
-"""Modules of the page one by one, in a real browser: they read what others write."""
+"""Modules of the page one by one, in a real browser: they read the output of others."""
 
 import base64
 import json

@@ -169,7 +169,7 @@ def test_the_page_of_a_folder_that_exists_is_left_alone(tmp_path):
 
 LANGUAGES = {"rust": ("In Rust", "src/lib.rs"), "c": ("In C:", "my_{}.c"), "cpp": ("In C++", "my_{}.cpp"),
              "python": ("In Python", "my_{}.py")}
-# The tests that each tutorial speaks of.
+# The tests that each tutorial mentions.
 SPOKEN = {"soil": ["jacobian-soil", "jacobian-force", "force-and-motion", "passive", "cycles-dissipate",
                    "energy-balance", "heat-stays"],
           "robot": ["falls", "no-gravity", "force-moves", "jacobian-robot", "estimate-holds", "velocity", "described"],
@@ -289,7 +289,7 @@ def test_the_last_check_is_shown_by_the_bytes_of_the_file(tmp_path, monkeypatch)
     assert "not checked since it was built" in shown()
     assert terraglue("check-module", place, "--level", "quick").returncode == 1
     assert "last check: failed" in shown() and " fail" in shown()
-    # one test alone says nothing of the module
+    # one test alone is no verdict on the module
     law_with(place, ("out->pressure[i] / z;", "p[N] * out->pressure[i] / z + bekker / p[Z_1];"))
     assert terraglue("check-module", place, "--only", "loads").returncode == 0
     assert "failed" not in shown()

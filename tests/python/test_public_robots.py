@@ -1,4 +1,4 @@
-"""Public robots beside an oracle, where the packages are there; docs/robots.md says how to get them."""
+"""Public robots against an oracle, where the packages are there; docs/robots.md explains how to get them."""
 
 import importlib.util
 

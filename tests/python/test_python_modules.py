@@ -1,4 +1,4 @@
-"""Modules in Python: made, run and checked as the others; what fails says where; nothing is left behind."""
+"""Modules in Python: made, run and checked as the others; a failure names its place; nothing is left behind."""
 
 import array
 import importlib

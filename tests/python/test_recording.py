@@ -45,7 +45,7 @@ def points(cloud):
 
 
 def test_the_default_walk_takes_fifteen_megabytes(walk):
-    # its 24 drives show heat, current and energy beside: 0.7 MB more
+    # its 24 drives show heat, current and energy in addition: 0.7 MB more
     assert (walk / "recording.mcap").stat().st_size <= 15 * MB
 
 
@@ -75,7 +75,7 @@ def test_what_never_changes_is_written_once(walk, decoded):
         return parts[-1] in {field.name for field, _ in message.ListFields()}
 
     again = [n for n in constant if written(robot, n.split(".")[1:])]
-    # A module does not say of its own outputs that they stay: centres of mass, and the voltages of supply and drives.
+    # A module does not mark its own outputs as constant: centres of mass, and the voltages of supply and drives.
     expected = [n for n in constant if n.endswith((".force_at_x", ".voltage")) and float(table[0][n])]
     assert sorted(again) == sorted(expected)
 
@@ -105,7 +105,7 @@ def test_robot_relief_prints_and_forces_are_there_for_viewers(walk, decoded):
     assert {e.frame_id for e in decoded["/scene"][0][1].entities} == frames
     shapes = {topic for topic in decoded if topic.startswith("/shapes/")}
     assert {decoded[topic][0][1].frame_id for topic in shapes} <= frames and len(shapes) > 6
-    # The last message of each tile is what a viewer shows at the end: all of the ground, with every print.
+    # The last message of each tile is shown at the end: all of the ground, with every print.
     start, end = decoded["/ground"][0][1], decoded["/ground"][-1][1]
     count = len(end.data) // 8
     shown = {}
@@ -186,7 +186,7 @@ def test_rerun_reads_joints_by_name(walk):
 
 def test_overlays_are_recorded_where_they_are_wanted(tmp_path, decoded):
     assert not any(topic.startswith("/overlays") for topic in decoded)
-    # a single pass leaves no residual that would say anything
+    # a single pass leaves no meaningful residual
     sets = ("--set", "recording.overlays=true", "--set", 'gait.mount="robot.body"', "--set", "gluing.strategy=iterative")
     process = terraglue("run", MOON_WALK, "--out", tmp_path, "--duration", "1", "--quiet", "--no-report", *sets)
     assert process.returncode == 0, process.stderr

@@ -37,7 +37,7 @@ def run(place, out, *arguments):
 
 
 def complaints(process):
-    """What was said on standard error, but for events that a short run does not reach."""
+    """The messages on standard error, except for events that a short run does not reach."""
     return [line for line in process.stderr.splitlines() if "never happens: the run ends" not in line]
 
 

@@ -1,4 +1,4 @@
-"""Reads what a run leaves behind, as a user's script would."""
+"""Reads the files of a run, as a user's script would."""
 
 import csv
 import json
@@ -123,7 +123,7 @@ def messages(path):
 
 
 def wait_for_messages(path, process):
-    """Until a message can be read of what was written so far: sizes do not tell, and times depend on the machine."""
+    """Until a message can be read from the file so far: sizes are no criterion, and times depend on the machine."""
     while messages(path) == 0:
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.1)
@@ -149,7 +149,7 @@ def records_of_cut_file(path):
     with open(path, "rb") as file:
         try:
             yield from StreamReader(file).records
-        except Exception:  # the reader raises at the cut; what came before counts
+        except Exception:  # the reader raises at the cut; the messages before it count
             return
 
 

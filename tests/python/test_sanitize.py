@@ -1,4 +1,4 @@
-"""`check-module --sanitize` names file and line of what only a sanitizer sees."""
+"""`check-module --sanitize` names file and line of faults that only a sanitizer sees."""
 
 import subprocess
 

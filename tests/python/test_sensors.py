@@ -30,7 +30,7 @@ isolate = {isolate}
 
 
 def messages(path):
-    """All messages, without what tells of the scenario."""
+    """All messages, without those about the scenario."""
     with open(path, "rb") as file:
         return [(c.topic, m.log_time, m.data) for _, c, m in make_reader(file).iter_messages()]
 

@@ -1,4 +1,4 @@
-"""A run that is served: what clients change takes effect and stands in the recording, what they may not is refused with the reason,
+"""A run that is served: changes by clients take effect and are recorded, changes that are not allowed are refused with the reason,
 and watching changes nothing."""
 
 import base64
@@ -22,7 +22,7 @@ TORQUE = "robot.RF_j2.max_torque"
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """0.6 s of the walk that nobody watches: the folder."""
+    """The folder of 0.6 s of the walk that nobody watches."""
     folder = tmp_path_factory.mktemp("plain") / "out"
     process = terraglue("run", MOON_WALK, "--duration", "0.6", "--out", folder)
     assert process.returncode == 0, process.stderr

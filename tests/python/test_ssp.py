@@ -17,7 +17,7 @@ NAMES = (
 )
 UNITS = '<Unit name="m"><BaseUnit m="1"/></Unit>'
 
-# a gives 3 m; `inner` takes millimetres and doubles plus one metre; d is told millimetres, although it says metres
+# a gives 3 m; `inner` takes millimetres and doubles plus one metre; d receives millimetres, although it declares metres
 SYSTEM = f"""<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription {NAMES} name="plant">
 <ssd:System name="plant">
@@ -195,7 +195,7 @@ def test_an_archive_that_leads_out_of_its_folder_is_refused(files, tmp_path):
     assert done.returncode == 2 and "it is no SSP" in " ".join(done.stderr.split())
 
 
-# a tells a signal in millimetres and a state; the nested b and d hear both, d by another table
+# a provides a signal in millimetres and a state; the nested b and d read both, d by another table
 SHARED = f"""<?xml version="1.0"?><ssd:SystemStructureDescription {NAMES} xmlns:ssb="http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
  name="shared"><ssd:System name="shared">
  <ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" name="p"><ssv:Parameters>
@@ -256,7 +256,7 @@ PLAIN_END = 'startConnector="state" endElement="b" endConnector="i_in"/>'
 
 
 def test_a_table_follows_a_conversion_and_the_reverse(files, tmp_path):
-    # a tells 5: 2 * 5 + 10 = 20 on the bus, which d makes -2 by its table; behind a table it is 3 * 20 - 1 for b
+    # a gives 5: 2 * 5 + 10 = 20 on the bus, which d makes -2 by its table; behind a table it is 3 * 20 - 1 for b
     at = SHARED.index('<ssc:IntegerMappingTransformation>\n   <ssc:MapEntry source="0"')
     end = SHARED.index("</ssd:Connection>", at) + len("</ssd:Connection>")
     first = SHARED[:at] + LINEAR.format(2, 10) + SHARED[end:]

@@ -1,4 +1,4 @@
-"""States as bytes: an FMU goes on in another process as if nothing had happened, and refuses what is no state of it."""
+"""States as bytes: an FMU goes on in another process as if nothing had happened, and refuses bytes that are no state of it."""
 
 import pathlib
 import subprocess
@@ -60,7 +60,7 @@ def take(fmu, instance, data):
 
 
 def go_on(path, file):
-    """What the other process does."""
+    """The work of the other process."""
     fmu = Fmu(path)
     instance = start(fmu, "other", t=40 * H)
     take(fmu, instance, pathlib.Path(file).read_bytes())

@@ -24,7 +24,7 @@ def parts(tmp_path_factory):
 
 
 def sprung(parts, folder, step, to_spring="", to_mass="", more=""):
-    """Rows of 2 s of the mass on its spring; `to_spring` and `to_mass` stand in the connections, `more` with both FMUs."""
+    """Rows of 2 s of the mass on its spring; `to_spring` and `to_mass` are keys of the connections, `more` of both FMUs."""
     (folder / "s.toml").write_text(
         f"[time]\nstep_s = {step}\nduration_s = 2.0\n"
         f'[mass]\nfmu = "{parts}/mass.fmu"\n{more}[a_spring]\nfmu = "{parts}/spring.fmu"\n{more}'
@@ -256,7 +256,7 @@ def test_an_array_of_one_element_and_a_scalar_fit(tmp_path):
 
 
 def squares(folder, version, knows=True):
-    """A source with y = t² that tells its derivative, and a sum that holds its input over a step."""
+    """A source with y = t² that provides its derivative, and a sum that holds its input over a step."""
     build(folder, "integrator", INTEGRATOR, "r[1] += h * r[0];", depends="")
     flags = 'maxOutputDerivativeOrder="1"' if knows else ""
     if version == 2:

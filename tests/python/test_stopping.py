@@ -1,4 +1,4 @@
-"""Runs that end before their time: by a signal, by the length of their steps, beside another run."""
+"""Runs that end before their time: by a signal, by the length of their steps, next to another run."""
 
 import signal
 import subprocess

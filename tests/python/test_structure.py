@@ -78,7 +78,7 @@ def test_arrays_are_given_with_the_size_and_set_from_the_scenario(space, tmp_pat
 )
 def test_a_wrong_value_is_refused_by_name(space, tmp_path, start, says):
     done = terraglue("fmu", "run", space / "space.fmu", "--stop", "1", "--step", "0.125", "--start", start)
-    # only what the FMU itself does not take is a failure of the run
+    # only a value that the FMU itself rejects is a failure of the run
     code = 1 if "fmi3SetUInt64" in says else 2
     assert done.returncode == code and all(word in done.stderr for word in says), done.stderr
     value = start.split("=")[1]

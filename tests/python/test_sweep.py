@@ -109,7 +109,7 @@ def test_the_table_is_the_same_whoever_runs_it(whole, tmp_path, how):
         collected = terraglue("sweep", "collect", "sweep", "--json", cwd=tmp_path)
         assert json.loads(collected.stdout)["missing"] >= 16 - len(done) - 2
         swept(tmp_path)
-        # what was done is left as it was
+        # finished cases are left as they were
         assert all(path.stat().st_mtime_ns == when for path, when in done.items())
     else:
         listed(tmp_path)
@@ -136,7 +136,7 @@ def test_values_that_do_not_fit_are_cases_that_say_so(tmp_path):
     assert done.returncode == 1 and "20 done, 1 refused" in done.stdout, done.stderr
     rows = list(csv.DictReader((tmp_path / "sweep/sweep.csv").open()))
     assert rows[20]["status"] == "refused" and "no multiple of `step_s`" in rows[20]["reason"]
-    # nothing is run again unless it is asked for
+    # nothing is run again unless requested
     before = (tmp_path / "sweep/cases/0021/case.json").stat().st_mtime_ns
     assert terraglue("sweep", "run", "sweep", cwd=tmp_path).returncode == 1
     assert (tmp_path / "sweep/cases/0021/case.json").stat().st_mtime_ns == before
@@ -224,7 +224,7 @@ points = 10000
         place = tmp_path / f"sweep/cases/{k:05}"
         place.mkdir(parents=True)
         (place / "case.json").write_text(text)
-    # what a process has used at most counts the one that it was forked from; a limit does not
+    # the peak usage of a process counts the one that it was forked from; a limit does not
     limit = lambda: resource.setrlimit(resource.RLIMIT_DATA, (100 << 20, 100 << 20))
     done = subprocess.run([PROGRAM, "sweep", "collect", "sweep"], cwd=tmp_path, preexec_fn=limit, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""Bodies of FMUs that turn: forces beside their reference point and moments, by terminals of exported robots and by maps of names."""
+"""Bodies of FMUs that turn: forces off their reference point and moments, by terminals of exported robots and by maps of names."""
 
 import csv
 import json
@@ -15,7 +15,7 @@ H, STEPS = 0.001, 400
 GRAVITY = [0.0, 0.0, -9.81]
 HULL = {"mass": 3.0, "com": [0.1, -0.2, 0.05], "inertia": [0.2, 0.5, 0.4]}
 ARM = {"mass": 1.0, "com": [0.3, 0.0, 0.02], "inertia": [0.02, 0.1, 0.09]}
-# The joint in the world at the start, where hull and arm stand, and what the hull's frame turns with.
+# The joint in the world at the start, where hull and arm stand, and the rate of the hull's frame.
 JOINT, HULL_AT, ARM_AT, SPIN = [0.4, 0.1, 0.8], [0.0, 0.0, 1.0], [0.4, 0.1, 0.8], [1.0, 2.0, -1.5]
 MOTION = ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"]
 
@@ -181,7 +181,7 @@ def test_a_map_of_names_with_the_point_of_the_force_is_the_terminal(folder, tmp_
     wanted = run(folder, tmp_path / "terminal", plug("a", "hull_heavy", "hull") + glue("a.hull", "world"), steps=50)
     for k, point in enumerate([f"force_at = {HULL['com']}\n", 'force_at = ["hull.force_at_x", "hull.force_at_y", "hull.force_at_z"]\n']):
         same(run(folder, tmp_path / f"point{k}", mapped(point), steps=50), wanted, names, 0.0)
-    # a force whose point is not told acts elsewhere
+    # a force whose point is not given acts elsewhere
     other = run(folder, tmp_path / "origin", mapped(""), steps=50)
     with pytest.raises(AssertionError):
         same(other, wanted, names)
@@ -307,7 +307,7 @@ KINDS = {"none": "", "directional": 'providesDirectionalDerivatives="true"', "ad
 
 
 def hanging_ball(folder, kind, out):
-    """A ball that hangs beside its centre, at the corner of a cube: rows and evaluations a step."""
+    """A ball that hangs off its centre, at the corner of a cube: rows and evaluations a step."""
     build_3(folder, kind, BALL, BALL_STEP, "v[3][0] = 1; v[2][0] = 0.6; v[2][1] = -0.8; v[2][5] = 2;", BALL_SLOPES, KINDS[kind], calc=BALL_CALC)
     arrays = {"position": ("p", 1, 3), "velocity": ("v", 1, 3), "angular_velocity": ("v", 4, 6), "orientation": ("q", 1, 4)}
     text = "".join(f"{key} = {json.dumps([f'{n}[{k}]' for k in range(a, b + 1)])}\n" for key, (n, a, b) in arrays.items())

@@ -1,4 +1,4 @@
-"""The wheel rig drives with the slip and the load that it is given, on both soils, and tells what the wheel does."""
+"""The wheel rig drives with the slip and the load that it is given, on both soils, and reports the wheel's state."""
 
 import csv
 
@@ -18,7 +18,7 @@ def drive(folder, soil, slip, load):
     )
     assert process.returncode == 0, process.stderr
     assert "Wheels and feet" in (folder / "report.html").read_text()
-    # the slip that the soil tells is smoothed over the length of the contact, 7 cm
+    # the slip that the soil reports is smoothed over the length of the contact, 7 cm
     rows = [row for row in csv.DictReader((folder / "variables.csv").open()) if float(row["t_s"]) > 2.4]
     return {name: sum(float(row[f"soil.contact1.{name}"]) for row in rows) / len(rows) for name in TOLD}
 

@@ -1,7 +1,7 @@
 //! `cargo xtask architecture`: the table and the drawing of the crates in `docs/architecture.md`, from their manifests.
 //!
 //! A crate stands one floor above the highest of those that it uses, so every arrow of the drawing runs down. The shape of the code
-//! (cycles of files, large types, long functions) is held beside.
+//! (cycles of files, large types, long functions) is checked as well.
 
 use crate::shape;
 use serde_json::Value;

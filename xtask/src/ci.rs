@@ -1,4 +1,4 @@
-//! `cargo xtask lint`: what can be checked without a test. `cargo xtask ci`: the same and every test, which is what CI runs.
+//! `cargo xtask lint`: all checks that are no tests. `cargo xtask ci`: the same and every test, as in CI.
 
 use crate::test;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ pub fn lint() -> Outcome {
     must(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Runs a tool, after a preparation by cargo; says `skip` where one of them needs the network and has none.
+/// Runs a tool, after a preparation by cargo; reports `skip` where one of them needs the network and has none.
 fn with_tool(name: &str, arguments: &[&str], prepared: Option<&[&str]>) -> Outcome {
     let ready = prepared.map_or(Ok(()), |arguments| must(&mut cargo(arguments)));
     match ready.and_then(|()| tool(name)) {

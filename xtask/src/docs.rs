@@ -16,7 +16,7 @@ pub fn write_all() -> Outcome {
     claims()
 }
 
-/// The figures that stand in sentences.
+/// The figures quoted in sentences.
 fn claims() -> Outcome {
     let python = test::virtual_environment()?;
     let mut write = command(python, &["tests/python/claims.py", "--write"]);

@@ -1,7 +1,7 @@
 //! `cargo xtask freeze`: hashes of the decoded numbers of all scenarios, of exported FMUs and of the quick figures.
 //!
 //! Code that is moved, split, renamed or deleted must leave every number equal to the bit; a change of physics or of
-//! numerics writes the file anew in a commit of its own that says so. Scenario texts, metadata and timings do not
+//! numerics writes the file anew in a separate commit that states it. Scenario texts, metadata and timings do not
 //! count. Numbers are equal on one kind of processor only, so CI does not check them.
 
 mod digest;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use xtask_start::process::{Outcome, cargo, must, program, read, root, target, write};
 
-/// What `cargo xtask freeze` is asked for.
+/// Arguments of `cargo xtask freeze`.
 #[derive(clap::Args, Debug)]
 pub struct Arguments {
     /// Change nothing; fail where a number differs.

@@ -1,5 +1,5 @@
 //! `cargo xtask header [--check]`: writes `interfaces/plugin/include/terraglue.h` from the Rust definitions of the
-//! C ABI, or says whether the file is what it would write.
+//! C ABI, or checks that the file is up to date.
 
 use cbindgen::{Builder, Config, DocumentationStyle, Language, Style};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ const SOURCES: [&str; 8] = ["constants", "step", "variable", "scene", "law", "ho
 const PROLOGUE: &str = include_str!("header_prologue.txt");
 const EPILOGUE: &str = include_str!("header_epilogue.txt");
 
-/// Writes the header, or with `check` compares it. The error says what to do.
+/// Writes the header, or with `check` compares it. The error explains the remedy.
 pub fn run(check: bool) -> Result<(), String> {
     let path = interface().join("include/terraglue.h");
     let fresh = generate()?;

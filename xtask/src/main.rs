@@ -1,5 +1,5 @@
 //! The developer commands, the same as in CI: `cargo xtask test | lint | ci | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
-//! What measures is the program `terraglue-validation` (`tests/validation`), which the other commands do not compile.
+//! Figures are measured by the program `terraglue-validation` (`tests/validation`), which the other commands do not compile.
 
 mod architecture;
 mod ci;

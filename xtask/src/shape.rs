@@ -1,7 +1,7 @@
 //! The shape of the code that `cargo xtask architecture` holds: no cycle of files inside a crate, no type of too many fields or methods,
 //! no function of too many lines. It reads lines as rustfmt leaves them.
 //!
-//! What is beyond a bound stands in `tests/known-shapes.tsv` with its number, which may only fall.
+//! `tests/known-shapes.tsv` lists everything beyond a bound with its number, which may only fall.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ const MOST: [(&str, usize); 3] = [("fields", 25), ("methods", 40), ("lines", 60)
 /// Words before `fn`. The third is put together because a test looks for that word in code.
 const QUALIFIERS: [&str; 6] = ["pub", "const", concat!("un", "safe"), "extern", "\"C\"", "async"];
 
-/// What is beyond its bound: kind and name, and how many.
+/// Findings beyond their bounds: kind and name, and how many.
 pub type Findings = BTreeMap<(String, String), usize>;
 
 /// A source file without its tests.
@@ -22,7 +22,7 @@ struct Source {
     lines: Vec<String>,
 }
 
-/// Complaints about the sources of crates (folders relative to `root`) beside the known shapes.
+/// Complaints about the sources of crates (folders relative to `root`) apart from the known shapes.
 pub fn complaints(root: &Path, crates: &[String], known: &str) -> Result<Vec<String>, String> {
     let known = parsed(known)?;
     let found = findings(root, crates);
@@ -176,7 +176,7 @@ fn opened(line: &str) -> Option<(&'static str, String)> {
     Some(("methods", word(head)))
 }
 
-/// What follows the generics that a text begins with.
+/// The text after the generics that it begins with.
 fn without_generics(text: &str) -> &str {
     let mut depth = 0;
     for (k, c) in text.char_indices() {
@@ -198,8 +198,8 @@ fn module_of(path: &Path) -> Vec<String> {
     parts
 }
 
-/// Number of files that lie on a cycle of uses. A module and those inside it are one thing: what a file uses of the modules above it, or
-/// of those inside it, does not count.
+/// Number of files that lie on a cycle of uses. A module and those inside it are one thing: uses of the modules above a file, or of
+/// those inside it, do not count.
 fn files_in_cycles(sources: &[Source]) -> usize {
     let modules: Vec<Vec<String>> = sources.iter().map(|s| module_of(&s.path)).collect();
     let arrows: Vec<BTreeSet<usize>> =

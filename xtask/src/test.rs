@@ -9,7 +9,7 @@ pub fn test() -> Outcome {
     must(&mut cargo(&["build", "--workspace"]))?;
     must(&mut cargo(&["test", "--workspace", "--no-fail-fast"]))?;
     let python = virtual_environment()?;
-    // a file is the work of one process: its tests share what its fixtures have made
+    // a file is the work of one process: its tests share its fixtures
     let in_parallel = ["-n", "auto", "--maxprocesses", "4", "--dist", "loadfile"];
     let tests = [&["-m", "pytest", "-q", "tests/python"], &in_parallel[..]].concat();
     must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;

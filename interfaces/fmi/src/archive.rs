@@ -1,7 +1,7 @@
 //! Checks the archive of an FMU before anything of it is written, and extracts it.
 //!
 //! An FMU is foreign: names that lead out of the folder, links, devices, bombs and lies about sizes are refused
-//! with the name of the entry. Sizes are counted while reading, whatever the archive says of itself.
+//! with the name of the entry. Sizes are counted while reading, whatever the archive declares.
 
 use crate::error::{Error, Result};
 use crate::folder::Folder;
@@ -32,13 +32,13 @@ impl Default for Limits {
     }
 }
 
-/// Up to this size nothing is looked at as a bomb: tables of one number may shrink to a thousandth.
+/// Up to this size nothing counts as a bomb: tables of one number may shrink to a thousandth.
 const SMALL: u64 = 256 << 20;
 
 /// A zip archive that was checked as a whole.
 pub struct Archive {
     path: PathBuf,
-    /// What must lie at its top, and what it is then.
+    /// File that must lie at its top, and the name of that kind of archive.
     top: [&'static str; 2],
     zip: ZipArchive<File>,
     limits: Limits,
@@ -50,7 +50,7 @@ impl Archive {
         Self::open_with(path, limits, ["modelDescription.xml", "FMU"])
     }
 
-    /// The same for another kind of archive: the file that must lie at its top, and what it is then.
+    /// The same for another kind of archive: the file that must lie at its top, and the name of the kind.
     pub fn open_with(path: &Path, limits: Limits, top: [&'static str; 2]) -> Result<Self> {
         let fail = |message: String| Error::Archive { path: path.into(), entry: None, message };
         let meta = std::fs::metadata(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
@@ -135,7 +135,7 @@ impl Archive {
         Ok(parts)
     }
 
-    /// What is said of files up to an entry that take so few bytes for what they hold; none: nothing.
+    /// The complaint about an entry, or files up to it, with too few `packed` bytes for `size`; none: no bomb.
     fn bomb(&self, packed: u64, size: u64) -> Option<String> {
         let blown_up = size > SMALL && (packed as f64) < size as f64 * self.limits.ratio;
         blown_up.then(|| format!("brings {packed} bytes to the claim to hold {size}: a bomb"))
@@ -248,7 +248,7 @@ fn write_entry(file: &mut ZipFile<'_, File>, target: &Path, left: u64) -> std::r
     Ok(written)
 }
 
-/// What an archive says of an entry.
+/// An entry as the archive declares it.
 struct Facts {
     name: String,
     size: u64,

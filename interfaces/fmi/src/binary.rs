@@ -97,7 +97,7 @@ fn missing(description: &ModelDescription, extracted: &Path, name: &str) -> Stri
     format!("has no library `binaries/{wanted}/{name}` for this platform; {has}")
 }
 
-/// Whether the file can be a library of this machine, as far as its bytes say.
+/// Whether the file can be a library of this machine, as far as its bytes show.
 fn inspect(path: &Path) -> std::result::Result<(), String> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
     if !elf::is_elf(&bytes) {
@@ -115,7 +115,7 @@ fn inspect(path: &Path) -> std::result::Result<(), String> {
 
 /// Opens a library. Some FMUs forget to link the mathematics library, or that of Python: they get a second try with it.
 fn open(path: &Path) -> std::result::Result<Library, String> {
-    // SAFETY: the user asked for this FMU; its constructors run.
+    // SAFETY: the user requested this FMU; its constructors run.
     let once = || unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
     let first = match once() {
         Ok(library) => return Ok(library),

@@ -112,8 +112,8 @@ pub fn exported_symbols(bytes: &[u8]) -> Option<Vec<String>> {
     Some(out)
 }
 
-/// Names of what a library takes from others, each with the place of the pointer to it, relative to where the library
-/// is loaded.
+/// Names of the symbols that a library imports, each with the place of the pointer to it, relative to where the
+/// library is loaded.
 pub fn imported_slots(bytes: &[u8]) -> Option<Vec<(String, usize)>> {
     const RELOCATION: usize = 24;
     const SYMBOL: usize = 24;

@@ -1,4 +1,4 @@
-//! What can be wrong with an FMU, split by what has to be mended: archive, description, library, behaviour.
+//! Errors of FMUs, by the part that has to be mended: archive, description, library, behaviour.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ pub enum Error {
         path: PathBuf,
         /// Entry of the archive.
         entry: Option<String>,
-        /// What is wrong.
+        /// Description of the problem.
         message: String,
     },
     /// `modelDescription.xml` breaks the standard.
@@ -27,7 +27,7 @@ pub enum Error {
         line: u32,
         /// Element.
         element: String,
-        /// What is wrong.
+        /// Description of the problem.
         message: String,
     },
     /// It is a good FMU, but of a kind that is not run here.
@@ -35,7 +35,7 @@ pub enum Error {
     Unsupported {
         /// File.
         path: PathBuf,
-        /// What it is.
+        /// Kind of FMU that it is.
         message: String,
     },
     /// Its shared library is missing or cannot be loaded.
@@ -43,7 +43,7 @@ pub enum Error {
     Library {
         /// File.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         message: String,
     },
     /// A function did not succeed.
@@ -51,7 +51,7 @@ pub enum Error {
     Call {
         /// Function of the C interface.
         function: &'static str,
-        /// Status or what else was wrong with its answer.
+        /// Status, or another fault of its answer.
         outcome: String,
         /// Last lines that the FMU logged.
         log: Vec<String>,
@@ -68,7 +68,7 @@ pub enum Error {
         /// Last lines that the FMU logged.
         log: Vec<String>,
     },
-    /// The FMU does not offer what was asked for.
+    /// The FMU does not offer the requested function.
     #[error("{0}")]
     Refused(String),
     /// A name, value or time that the caller gave does not fit the FMU.

@@ -1,4 +1,4 @@
-//! How this thread rounds and what becomes of tiny numbers: foreign code may change it – libraries that are linked with fast
+//! Rounding mode and subnormal numbers of this thread: foreign code may change it – libraries that are linked with fast
 //! mathematics do as soon as they are loaded – and everything that is computed after it would differ.
 #![allow(unsafe_code)] // Reads and writes the control register of the processor.
 

@@ -22,7 +22,7 @@ impl Fmu {
     /// Checks, reads and extracts an FMU. None of its code runs.
     ///
     /// # Errors
-    /// What is wrong with archive or description, with entry or line.
+    /// A fault of the archive or the description, with entry or line.
     pub fn open(path: &Path) -> Result<Arc<Self>> {
         Self::open_within(path, Limits::default())
     }
@@ -65,7 +65,7 @@ impl Fmu {
         &self.path
     }
 
-    /// What it says of itself.
+    /// Its description.
     pub fn description(&self) -> &Arc<ModelDescription> {
         &self.description
     }

@@ -16,10 +16,10 @@ const LOCK: &str = ".terraglue-lock";
 /// Folders of this process that are there.
 static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Removes all folders of this process, before it ends in the middle of what it does.
+/// Removes all folders of this process, before it ends in the middle of its work.
 pub fn remove_folders() {
     for folder in std::mem::take(&mut *FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)) {
-        // What cannot be removed now is removed by the next process that makes one.
+        // Folders that cannot be removed now are removed by the next process that makes one.
         drop(std::fs::remove_dir_all(folder));
     }
 }

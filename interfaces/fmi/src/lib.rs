@@ -7,8 +7,8 @@
 //!
 //! [`ssp::Package`] reads a system structure, several FMUs with their connections and parameters.
 //!
-//! Every status of every call is looked at. What is not success becomes an [`Error`] that names the file, the
-//! function, the time and what the FMU logged last; after `fatal` nothing of the instance is called again.
+//! Every status of every call is checked. Any failure becomes an [`Error`] that names the file, the function, the
+//! time and the last lines of the FMU's log; after `fatal` nothing of the instance is called again.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-//! All that an FMU of any version says of itself, as it stands there: also of FMI 1.0, model exchange and scheduled execution, which
+//! The description of an FMU of any version, as it is written: also of FMI 1.0, model exchange and scheduled execution, which
 //! are not run here.
 //!
 //! Texts are those of the description; nothing is completed or checked ([`crate::Fmu::inspect`] does that for FMUs that are run).
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use roxmltree::{Document, Node};
 use std::path::Path;
 
-/// Elements that say for what an FMU is made, and the words for it.
+/// Elements for the interface types of an FMU, and the words for them.
 const INTERFACES: [(&str, &str); 5] = [
     ("CoSimulation", "co-simulation"),
     ("ModelExchange", "model exchange"),
@@ -26,7 +26,7 @@ pub type Fact = (String, String);
 pub struct Overview {
     /// Attributes of the root: `fmiVersion`, `modelName`, `guid`, `author`, ….
     pub facts: Vec<Fact>,
-    /// For what it is made, each with its attributes.
+    /// Its interface types, each with its attributes.
     pub interfaces: Vec<(String, Vec<Fact>)>,
     /// Attributes of the default experiment.
     pub experiment: Vec<Fact>,
@@ -42,7 +42,7 @@ pub struct Overview {
     pub standards: Vec<[String; 3]>,
 }
 
-/// A variable as the description has it; empty where it says nothing.
+/// A variable as the description has it; empty where an attribute is missing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VariableFacts {
     /// Its name.
@@ -133,7 +133,7 @@ fn attribute(of: Node, name: &str) -> String {
     of.attribute(name).unwrap_or_default().trim().to_owned()
 }
 
-/// What it is made for. An FMU of FMI 1.0 without `<Implementation>` is one for model exchange.
+/// Its interface types. An FMU of FMI 1.0 without `<Implementation>` is one for model exchange.
 fn interfaces(root: Node) -> Vec<(String, Vec<Fact>)> {
     let implementation = elements(root).find(|n| n.tag_name().name() == "Implementation");
     let places = elements(root).chain(implementation.into_iter().flat_map(elements));
@@ -193,7 +193,7 @@ fn terminals(bytes: &[u8]) -> Vec<Fact> {
 fn standard(bytes: &[u8]) -> Option<[String; 3]> {
     let document = Document::parse(std::str::from_utf8(bytes).ok()?).ok()?;
     let root = document.root_element();
-    // the attributes stand in the namespace of the layered standards
+    // the attributes are in the namespace of the layered standards
     let of = |name: &str| {
         let found = root.attributes().find(|a| a.name() == name);
         found.map(|a| a.value().trim().to_owned()).unwrap_or_default()

@@ -1,6 +1,6 @@
 //! Archives and descriptions that lie, lead elsewhere or are too large: each is refused with one error before any code
-//! of it runs, and nothing is written outside the temporary folder nor left in it. Odd but legal ones are read. What the
-//! program says of them, with a library that tells whether its code ran, is measured by `cargo xtask validate fmi`.
+//! of it runs, and nothing is written outside the temporary folder nor left in it. Odd but legal ones are read.
+//! `cargo xtask validate fmi` checks the messages of the program, with a library that reports whether its code ran.
 
 use hostile_archives::{MANY, refused, unloadable, usable};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use terraglue_fmi::{Error, Fmu, FmuInstance, InstanceOptions, Limits};
 /// Stands for a library; nobody loads it here.
 const LIBRARY: &[u8] = b"library";
 
-/// A folder of its own for the archive; what lies beside it must not change.
+/// A folder of its own for the archive; the files next to it must not change.
 struct Place {
     folder: tempfile::TempDir,
 }
@@ -90,7 +90,7 @@ fn archives_that_were_cut_are_refused() {
     }
 }
 
-/// What happens to an FMU whose archive is good but whose library is not.
+/// Outcome of loading an FMU whose archive is good but whose library is not.
 fn loading(bytes: &[u8]) -> String {
     let place = Place::new();
     let fmu = Fmu::open(&place.write(bytes)).expect("a good archive");

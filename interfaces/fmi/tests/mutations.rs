@@ -14,7 +14,7 @@ fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|t| t.parse().ok()).unwrap_or(otherwise)
 }
 
-/// What the readers say, without numbers and names: the kind of answer.
+/// The kind of answer of the readers: their text without numbers and names.
 fn answer(path: &Path, bytes: &[u8]) -> String {
     std::fs::write(path, bytes).expect("written");
     let limits = Limits { total: 1 << 24, description: 1 << 22, ..Limits::default() };

@@ -11,7 +11,7 @@ const CHUNK: usize = 64;
 
 /// Appends the nodes whose cells the shape covers and whose surface lies less than `margin` (m, vertical) below
 /// the shape's underside, and those on the inclined underside next to them, row by row: the soil can reach into their cells, and they
-/// tell how the underside goes on.
+/// show how the underside goes on.
 ///
 /// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, of polygons with 34
 /// corners for other cylinders and capsules, of the hull of corners farthest in 32 directions for convex meshes, and from 8 × 8 points for

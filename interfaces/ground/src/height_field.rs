@@ -1,4 +1,4 @@
-//! Heights of the ground's material in fixed point: what moves from node to node is an integer, so none is lost.
+//! Heights of the ground's material in fixed point: material moves between nodes in whole units, so none is lost.
 
 use crate::Surface;
 use crate::identity::Identity;
@@ -11,7 +11,7 @@ pub const UNIT_M: f64 = 1.0 / 4_194_304.0;
 
 /// Largest height that is accepted at the start, m; leaves a metre for piles and holes.
 const LIMIT_M: f64 = 511.0;
-/// Tiles that can be touched before memory is asked for again.
+/// Tiles that can be touched before memory is allocated again.
 const RESERVE_TILES: usize = 1024;
 const UNTOUCHED: u32 = u32::MAX;
 
@@ -199,8 +199,8 @@ impl HeightField {
         self.add_units(i, j, units - self.units(i, j));
     }
 
-    /// Puts the nodes `first` … of a tile, all in one row, at the heights `new` (units); `changes` receives what each
-    /// gained. False when none did: then the tile stays untouched.
+    /// Puts the nodes `first` … of a tile, all in one row, at the heights `new` (units); `changes` receives the gain
+    /// of each. False when none changed: then the tile stays untouched.
     #[inline]
     pub fn write_row(&mut self, tile: usize, first: usize, new: &[i32], changes: &mut [i32]) -> bool {
         let range = first..first + new.len();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-/// Tells fields apart, so that a generation means the same contents only in the field that counted it. A copy of a
+/// Distinguishes fields, so that a generation means the same contents only in the field that counted it. A copy of a
 /// field is another field.
 #[derive(Debug, Default)]
 pub(crate) struct Identity(Arc<()>);
@@ -21,7 +21,7 @@ pub(crate) struct Origin {
 }
 
 impl Origin {
-    /// From now on that of this field; what was known of another one's tiles is forgotten.
+    /// From now on that of this field; knowledge of another one's tiles is discarded.
     pub fn set(&mut self, field: &Identity) {
         if !self.is(field) {
             self.generations.clear();

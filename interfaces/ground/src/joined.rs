@@ -74,7 +74,7 @@ struct Below<'a> {
     part: (usize, Part<'a>),
 }
 
-/// Below one convex part; `last` keeps the outline of the part that was asked for last, and its number.
+/// Below one convex part; `last` keeps the outline of the last part, and its number.
 fn alone<'a>(
     part: (usize, Part<'a>),
     last: &mut Option<(usize, Outline)>,

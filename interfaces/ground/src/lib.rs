@@ -1,14 +1,14 @@
 //! The height field that soils shape and everybody reads, with the exact lower surface of every shape.
 //!
 //! * [`Lattice`]: where the nodes lie, and how they are grouped into tiles of 32 × 32.
-//! * [`HeightField`]: heights of material in fixed point, so that moving material loses nothing; ground
-//!   that nobody touched costs nothing.
+//! * [`HeightField`]: heights of material in fixed point, so that moving material loses nothing; untouched ground costs
+//!   nothing.
 //! * [`TileMap`]: any state per node in the same tiles, for soils.
 //! * [`Placed`]: a shape at a pose: its exact underside, support point and bounding box.
 //! * [`nodes_below`]: the nodes of a contact patch with their covered areas; [`nodes_below_parts`]: of several shapes in one.
 //! * [`fit_plane`]: height and normal of the ground below a footprint.
 //!
-//! Nothing here knows what soil is; contact detection, soils and later sensors share it.
+//! Nothing here depends on soil; contact detection, soils and sensors share it.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

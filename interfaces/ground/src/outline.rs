@@ -136,7 +136,7 @@ impl Outline {
     }
 
     /// Covered area and point of the lower surface of a node that is covered, and lower than `reach` or `beside` one that is.
-    /// The area, which costs most, is asked for last.
+    /// The area, which costs most, is computed last.
     pub fn node(
         &self,
         shape: &Placed,
@@ -189,8 +189,8 @@ impl Outline {
 }
 
 /// Part of the radius that a round underside's rim is drawn in: closer to its widest circle the underside is a wall, and
-/// its height at a node no statement about the soil there. What a stiff soil would feel of a rounding error of the
-/// position is bounded by it (the slope at this rim is 32).
+/// its height at a node says nothing about the soil there. It bounds the effect of a rounding error of the position on a
+/// stiff soil (the slope at this rim is 32).
 const RIM: f64 = 5e-4;
 
 /// Underside at the rim of a disc on the ray to a node, as far below the shape's origin at every node.
@@ -252,7 +252,7 @@ impl Polygon {
     }
 }
 
-/// Outline of a cylinder or capsule that does not stand: two ellipses, the discs at its ends seen from above, and what lies
+/// Outline of a cylinder or capsule that does not stand: two ellipses, the discs at its ends seen from above, and the area
 /// between them. The polygon has their area.
 fn rounded_outline(shape: &Placed, half_length: f64, radius: f64, flat: bool) -> Outline {
     let (centre, axis) = (shape.pose().position, shape.rotation().0[2]);
@@ -285,11 +285,11 @@ fn rounded_outline(shape: &Placed, half_length: f64, radius: f64, flat: bool) ->
     Outline::Polygon(polygon)
 }
 
-/// Directions in which the corners of a mesh are looked for.
+/// Directions in which the corners of a mesh are searched.
 const DIRECTIONS: usize = 32;
 
 /// Hull of the corners of a convex mesh that lie farthest in each of 32 horizontal directions: all its corners seen from above but
-/// those at which the outline turns by less than 11°, beside which it lies inside by at most 0.5 % of its width.
+/// those at which the outline turns by less than 11°, where it lies inside by at most 0.5 % of its width.
 fn mesh_outline(shape: &Placed, corners: &[[f64; 3]]) -> Outline {
     let directions: [[f64; 2]; DIRECTIONS] = std::array::from_fn(|k| {
         let (s, c) = libm::sincos(std::f64::consts::TAU * k as f64 / DIRECTIONS as f64);

@@ -5,7 +5,7 @@ use crate::Surface;
 /// A plane through (x, y, height) with an upward unit normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Height at the point that was asked for, m.
+    /// Height at the queried point, m.
     pub height: f64,
     /// Upward unit normal, world.
     pub normal: [f64; 3],
@@ -27,7 +27,7 @@ pub fn fit_plane<S: Surface + ?Sized>(surface: &S, x: f64, y: f64, radius: f64) 
     PlaneFit::new(surface, radius).at(x, y)
 }
 
-/// Fits of planes within one radius; what was read for one serves the next where it samples the same nodes.
+/// Fits of planes within one radius; heights read for one serve the next where it samples the same nodes.
 pub struct PlaneFit<'a, S: Surface + ?Sized> {
     surface: &'a S,
     /// Radius of the weights, m.

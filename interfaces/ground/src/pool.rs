@@ -27,7 +27,7 @@ impl<T: Copy> Pool<T> {
         self.free.reserve(wanted.saturating_sub(self.free.len()));
     }
 
-    /// Number of a tile that is nobody else's; its contents are old.
+    /// Number of a free tile; its contents are old.
     pub fn take(&mut self) -> u32 {
         if let Some(tile) = self.free.pop() {
             return tile;

@@ -1,4 +1,4 @@
-//! State per node in tiles: what soils remember (sinkage, shear, yield) without paying for untouched ground.
+//! State per node in tiles: the memory of soils (sinkage, shear, yield) without cost for untouched ground.
 
 use crate::identity::{Identity, Origin};
 use crate::lattice::{Lattice, TILE_NODES};
@@ -24,7 +24,7 @@ pub struct TileMap<T> {
 }
 
 /// Exact copy of the tiles of a [`TileMap`] that exist; refilled without allocation once it was large enough, and without
-/// looking at tiles that nobody has written since.
+/// reading tiles that are unchanged since.
 #[derive(Clone, Debug)]
 pub struct TileMapSnapshot<T> {
     touched: Vec<u32>,

@@ -132,7 +132,7 @@ proptest! {
                     for tile in 0..28 {
                         prop_assert_eq!(field.tile(tile), heights.tile(tile));
                         prop_assert_eq!(map.tile(tile), values.tile(tile));
-                        // a number that stays tells readers that nothing changed
+                        // readers take an unchanged number for unchanged contents
                         prop_assert!(field.generation(tile) != before[tile] || field.tile(tile) == old.tile(tile));
                     }
                     prop_assert_eq!(field.gained_units(), heights.gained_units());

@@ -187,8 +187,8 @@ proptest! {
     }
 }
 
-/// A vertical line that just grazes the widest circle of a rolling wheel: what rounding makes of both ends of an interval
-/// without length must not lie below the wheel.
+/// A vertical line that just grazes the widest circle of a rolling wheel: the rounded ends of an interval without length
+/// must not lie below the wheel.
 #[test]
 fn lines_that_graze_a_wheel_do_not_enter_it_below_its_lowest_point() {
     let (radius, half_length) = (0.092, 0.0535);

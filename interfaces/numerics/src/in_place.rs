@@ -6,8 +6,8 @@ pub fn cholesky(n: usize, a: &mut [f64]) -> bool {
     cholesky_above(n, a, 0.0)
 }
 
-/// The same where each pivot has to be larger than a share of its entry on the diagonal: what else determines an unknown
-/// leaves so much of it.
+/// The same where each pivot has to be larger than a share of its entry on the diagonal: the other unknowns must leave
+/// so much of it.
 #[inline]
 pub fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
     for j in 0..n {

@@ -1,4 +1,4 @@
-//! Numbers drawn from a seed by their place in a sequence: nothing is remembered, so what is drawn does not depend on order or threads.
+//! Numbers drawn from a seed by their place in a sequence: nothing is remembered, so the numbers do not depend on order or threads.
 
 /// One step of SplitMix64 (Steele, Lea and Flood, 2014): 64 bits that know nothing of those of neighbouring numbers.
 #[inline]

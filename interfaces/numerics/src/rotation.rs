@@ -1,6 +1,6 @@
-//! Vectors and unit quaternions (w, x, y, z) of what the coordinator itself turns: glue, feet and bodies of FMUs.
+//! Vectors and unit quaternions (w, x, y, z) for parts that the coordinator turns: glue, feet and bodies of FMUs.
 
-/// Vector, m or whatever the value says.
+/// Vector, in m or the unit of the value.
 pub type Vector = [f64; 3];
 /// Unit quaternion w, x, y, z.
 pub type Quaternion = [f64; 4];

@@ -1,6 +1,6 @@
-"""What a Terraglue module in Python is made of; needs Python 3.8 and the standard library alone.
+"""Base classes of Terraglue modules in Python; needs Python 3.8 and the standard library alone.
 
-A module is one file. Its docstring holds, from the line `[module]` on, a TOML block that says what it is and which
+A module is one file. Its docstring holds, from the line `[module]` on, a TOML block with its kind, its description and the
 parameters it takes; the host reads it without running the file. Below it stands one class derived from `Subsystem`.
 The host runs the file in a process of its own with your interpreter and packages, and exchanges arrays with it through
 shared memory: `memoryview`s of doubles, which `numpy.frombuffer` takes as they are. Everything handed to a call is borrowed:
@@ -13,10 +13,10 @@ import array
 import math
 import struct
 
-# What an instance can do beyond `advance`: the sum stands in `Subsystem.can`.
+# Capabilities of an instance beyond `advance`: their sum is `Subsystem.can`.
 FORCE, MOTION, ESTIMATE, SOLVE, DERIVATIVES, RETRY = 1, 2, 8, 16, 32, 64
 SUBCYCLES, FEEDTHROUGH, SEES, HIDES = 512, 1024, 8192, 16384
-# Roles of a variable, what a change of it does, and the types of its elements.
+# Roles of a variable, the effects of a change, and the types of its elements.
 PARAMETER, INPUT, OUTPUT, LOCAL = range(4)
 LIVE, NEEDS_RESET, READ_ONLY = range(3)
 F64, F32, I8, I16, I32, I64, U8, U16, U32, U64, BOOL, STRING, BINARY, ENUMERATION = range(14)
@@ -191,7 +191,7 @@ class Stream:
 
 
 class Overlay:
-    """Shown beside the bodies in a layer. figure: "lines", "points", "arrows" (data: points; size: width), "ellipse" (data:
+    """Shown with the bodies in a layer. figure: "lines", "points", "arrows" (data: points; size: width), "ellipse" (data:
     position, orientation, half lengths) or "text" (data: position, text; size: height); frame: place of a body, None: world, MOUNT: the body that the
     parameter `mount` names."""
 
@@ -205,7 +205,7 @@ class Overlay:
 
 class Field:
     """Values over the ground, x fastest; the one named `height` is what feet touch. Change them by `put`, or change
-    `values` and say `changed`."""
+    `values` and call `changed`."""
 
     def __init__(self, name, unit, origin, spacing, size, values=None):
         self.name, self.unit, self.origin, self.spacing, self.size = name, unit, tuple(origin), spacing, tuple(size)
@@ -269,7 +269,7 @@ class Host:
 
 
 class Hits:
-    """What rays met, one each: distance (m; infinite: nothing), normal, subsystem, body, shape (GROUND: the ground), material
+    """Hits of rays, one each: distance (m; infinite: nothing), normal, subsystem, body, shape (GROUND: the ground), material
     class, reflectance, transmittance. `raw` takes `numpy.frombuffer(hits.raw, Hits.NUMPY)`."""
 
     FORM = struct.Struct("<4d4I2f")
@@ -300,7 +300,7 @@ SHAPES, THE_GROUND = 1, 2
 
 
 class World:
-    """The committed world of the step [start, time], valid during `observe`: everything asked is of the time that the
+    """The committed world of the step [start, time], valid during `observe`: every answer is for the time that the
     question names within it, interpolated between the committed states; nothing of what comes after is known. Subsystems are
     numbered by their place in `subsystems`, bodies are pairs (subsystem, body). `skip` is a body that rays pass by."""
 
@@ -325,7 +325,7 @@ class World:
         return list(self._ask(6, struct.pack("<I", len(flat) // 2), flat.tobytes()).doubles())
 
     def overlap(self, centre, radius, skip=None, sees=SHAPES | THE_GROUND, classes=0xFFFFFFFF):
-        """Triples (subsystem, body, shape) of what a sphere touches."""
+        """Triples (subsystem, body, shape) of the shapes that a sphere touches."""
         mask = struct.pack("<4I", sees, classes, *(skip or (GROUND, GROUND)))
         raw = self._ask(7, mask + struct.pack("<4d", *centre, radius)).bytes_of(12)
         return list(struct.iter_unpack("<3I", raw))
@@ -398,7 +398,7 @@ class Subsystem:
         """Paper, step 5: the last trial is accepted under t; the other side moved to `partner`."""
 
     def observe(self, step, world):
-        """With SEES in `can`: the committed world, once per step after all have committed; what was seen belongs to the state
+        """With SEES in `can`: the committed world, once per step after all have committed; observations belong to the state
         at t + h. At the start of a run step.h = 0."""
 
     def shape_visibility(self):
@@ -410,11 +410,11 @@ class Subsystem:
         return None
 
     def overlays(self):
-        """What is shown beside the bodies: a list of `Overlay`; asked only when somebody looks."""
+        """A list of `Overlay` to show with the bodies; called only when they are displayed or recorded."""
         return []
 
     def restored(self):
-        """Called after `state` was put back, to rebuild what follows from it."""
+        """Called after `state` was put back, to rebuild values that follow from it."""
 
     def migrate(self, state):
         """The state of an earlier version of this code, whose keys differ, as one of this code."""

@@ -1,4 +1,4 @@
-"""An interpreter that has loaded what every worker needs, and waits. A host that asks gets a worker that is a copy of it (fork):
+"""An interpreter that has loaded the imports of every worker, and waits. A host that asks gets a worker that is a copy of it (fork):
 that takes a millisecond, a start some fifty. `terraglue check-module` keeps a few, because most of its tests make workers.
 
 Hosts ask over a socket, which is standard input here, with three lines: segment, folder, and where the standard input of the
@@ -64,7 +64,7 @@ class _Worker:
             os._exit(1)
 
     def tell(self):
-        """Tells the host when the process has ended. Its number stays taken until the host has let go of it."""
+        """Notifies the host when the process has ended. Its number stays taken until the host has let go of it."""
         if self.told:
             return
         ended = os.waitid(os.P_PID, self.process, os.WEXITED | os.WNOHANG | os.WNOWAIT)
@@ -126,7 +126,7 @@ def serve():
                 except OSError:
                     _leave(worker, poll, workers)
             elif file in workers:
-                # A host says nothing more: it has let go.
+                # The host has closed its end.
                 _leave(workers[file], poll, workers)
 
 

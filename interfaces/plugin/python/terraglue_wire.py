@@ -1,4 +1,4 @@
-"""Calls and answers as bytes in the memory that a worker shares with its host: the segment, and what is read and written
+"""Calls and answers as bytes in the memory that a worker shares with its host: the segment, and the data read and written
 there. The other side is `coordinator/host/src/isolation`."""
 import array
 import ctypes
@@ -62,10 +62,10 @@ class Segment:
         return min(head[2], AREA)
 
     def post(self, length):
-        """The answer stands there."""
+        """The answer is written."""
         self.head[3] = length
         if self._weak:
-            # A call of the kernel orders what was written before the counter.
+            # A call of the kernel orders earlier writes before the counter.
             self._system(self._number, self._answer, self.WAKE, self._one, None)
         self.head[1] = self.last
         self._system(self._number, self._answer, self.WAKE, self._one, None)
@@ -105,7 +105,7 @@ class Call:
         return self.memory[at:end].cast("d") if count else _EMPTY
 
     def bytes_of(self, size):
-        """The bytes of so many structures of a size as are told."""
+        """The bytes of a counted row of structures of this size."""
         count = size * self.u32()
         self.at += count
         return bytes(self.memory[self.at - count:self.at])

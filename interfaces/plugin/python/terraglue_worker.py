@@ -1,5 +1,5 @@
-"""The process of a module in Python: makes one instance and answers the host until it is told to quit or its host is gone.
-What the module keeps in `state` is saved, restored and written as bytes here."""
+"""The process of a module in Python: makes one instance and answers the host until it receives quit or its host is gone.
+The module's `state` is saved, restored and written as bytes here."""
 import array
 import copy
 import json
@@ -23,7 +23,7 @@ _HEAD = b"terraglue python state 1\n"
 
 
 def _plain(x):
-    """As JSON that says which kind of collection stood there."""
+    """As JSON that keeps the kind of each collection."""
     if x is None or isinstance(x, (bool, int, float, str)):
         return x
     if isinstance(x, list):
@@ -82,7 +82,7 @@ def _unpacked_state(subsystem, data):
 
 
 def _names(state):
-    """What tells states of different code apart: the texts among the keys of a dictionary, else the type."""
+    """The mark of states of the same code: the texts among the keys of a dictionary, else the type."""
     if not isinstance(state, dict):
         return type(state).__name__
     return ", ".join(sorted(k for k in state if isinstance(k, str))) or "no names"
@@ -159,7 +159,7 @@ class Worker:
         return reply.at
 
     def told(self):
-        """The exception with its traceback, without what happened in this file."""
+        """The exception with its traceback, without the frames of this file."""
         kind, error, trace = sys.exc_info()
         while trace is not None and trace.tb_frame.f_code.co_filename == __file__:
             trace = trace.tb_next
@@ -297,11 +297,11 @@ class Worker:
             reply.text(j.break_action)
 
     def _messages(self, reply):
-        """What the last step made on the streams."""
+        """The messages of the last step on the streams."""
         for k, info in enumerate(self.subsystem.streams):
             try:
                 message = self.subsystem.stream(k)
-            except Exception as e:  # the host tells it as the failure of `stream`
+            except Exception as e:  # the host reports it as the failure of `stream`
                 reply.u8(2)
                 reply.text(str(e) or type(e).__name__)
                 continue
@@ -311,7 +311,7 @@ class Worker:
                 reply.u8(2)
                 reply.text(f"stream `{info.name}`: a message is None or (time, bytes), and not a {type(message).__name__} such as {message!r:.50}")
                 continue
-            # room for the beginnings of the others, and for what is logged
+            # room for the beginnings of the others, and for the log
             fits = reply.at + len(data) + 65536 < len(reply.memory)
             if not fits and k not in self.left_out:
                 self.left_out.add(k)
@@ -373,7 +373,7 @@ class Worker:
                 reply.text(text)
 
     def _tiles(self, reply):
-        """What of the fields is new."""
+        """The tiles of fields that are new."""
         self.generation += 1
         for number, field in enumerate(self.fields):
             for k in sorted(field._new):
@@ -560,7 +560,7 @@ class Worker:
 
 
 class _Print:
-    """What the module prints goes to the log of the run, line by line."""
+    """The module's output goes to the log of the run, line by line."""
 
     encoding = "utf-8"
 
@@ -582,7 +582,7 @@ class _Print:
 
 
 def _load(path):
-    """The file as a module. It is read afresh, and no compiled copy is left beside it."""
+    """The file as a module. It is read afresh, and no compiled copy is left next to it."""
     sys.path.insert(1, os.path.dirname(path))
     with open(path, encoding="utf-8") as file:
         text = file.read()

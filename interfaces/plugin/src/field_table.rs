@@ -53,7 +53,7 @@ pub(crate) const NO_TILE: TgFieldTile = TgFieldTile {
 };
 
 /// # Safety
-/// The data of the tile hold as many values as it says and nobody writes them during `'a`.
+/// The data of the tile hold as many values as it declares and nobody writes them during `'a`.
 pub(crate) unsafe fn tile_in<'a>(out: &TgFieldTile, info: &FieldInfo) -> Result<FieldTile<'a>> {
     let needed = (info.tile_edge as usize).pow(2);
     if out.format != TG_TILE_UNIFORM && (out.count < needed || out.data.is_null()) {

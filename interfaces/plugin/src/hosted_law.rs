@@ -1,14 +1,14 @@
 //! A law that lives in the host – in another process, say – as foreign soils see it: a table of functions like that of any
 //! law, whose only number is the place of the law.
 //!
-//! A status says less than the law itself: what it said is kept here, and completes the error of the soil's call.
+//! A status carries less than the law's own message: that is kept here, and completes the error of the soil's call.
 
 use crate::abi::*;
 use crate::law::{TableLaw, pressed, sheared};
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_subsystem::{Error, NodeLaw, Result};
 
-/// The law, and what it said when it failed last.
+/// The law, and the message of its last failure.
 struct Inner {
     law: Arc<dyn NodeLaw>,
     words: Mutex<Option<String>>,

@@ -28,7 +28,7 @@ fn called(h: f64, longest: &mut f64, law: impl FnOnce(&mut f64) -> Result) -> Tg
     match catch_unwind(AssertUnwindSafe(|| law(longest))) {
         Ok(Ok(())) => TG_OK,
         Ok(Err(Error::Discard { .. })) => {
-            // a law knows no time: half the step unless it has said how much
+            // a law knows no time: half the step unless it has given a length
             *longest = longest.min(0.5 * h);
             TG_OK
         }
@@ -53,7 +53,7 @@ unsafe extern "C" fn shear<L: LawModule>(nodes: *const TgShearNodes, out: *mut T
 /// A pressure function of C around one in Rust; a panic is a status.
 ///
 /// # Safety
-/// The pointers are null or as the header says, for a law that keeps `doubles` per node.
+/// The pointers are null or as the header requires, for a law that keeps `doubles` per node.
 #[inline]
 pub(crate) unsafe fn pressed(
     nodes: *const TgPressureNodes,
@@ -182,7 +182,7 @@ impl TableLaw {
     /// A law that a host has opened.
     ///
     /// # Safety
-    /// `open` is null or valid as the header says.
+    /// `open` is null or valid as the header requires.
     pub(crate) unsafe fn of_host(open: *const TgOpenLaw) -> Option<Arc<dyn NodeLaw>> {
         // SAFETY: by the contract; the numbers are copied.
         unsafe {

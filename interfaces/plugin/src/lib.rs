@@ -2,14 +2,14 @@
 //!
 //! No Rust type and no panic crosses the border: [`abi`] holds plain C types, `export_subsystem!` wraps a Rust
 //! [`terraglue_subsystem::Module`] into the table, [`ForeignModule`] makes any table, written in Rust or in C,
-//! a module again. `include/terraglue.h` says the same to C; it is generated from [`abi`].
+//! a module again. `include/terraglue.h` is the same for C; it is generated from [`abi`].
 //!
 //! ```ignore
 //! //! The module my-soil as a dynamic library (crate-type = ["cdylib"]).
 //! terraglue_plugin::export_subsystem!(my_soil::MySoil);
 //! ```
 //!
-//! Unsafe code stands here because pointers of foreign code are read and written; every block says why it holds.
+//! Unsafe code is needed here because pointers of foreign code are read and written; every block says why it is sound.
 #![allow(unsafe_code)]
 
 /// The examples of the README, which the tests compile.
@@ -60,10 +60,10 @@ macro_rules! abi_version {
 
 /// Exports a type that implements [`terraglue_subsystem::Module`] as the module of this dynamic library.
 ///
-/// The crate is a `cdylib` named `<module name>-plugin` and holds nothing else. After the type stands what the section of the
-/// library says: the kind, what an instance can do (the words of [`describe`]), and its variables, each as `NAME ROLE TYPE
-/// UNIT`. A `*` in a name stands for what depends on parameters, units may have alternatives: `*.torque output f64 N m | N`.
-/// `check-module` compares it with what an instance says.
+/// The crate is a `cdylib` named `<module name>-plugin` and holds nothing else. After the type comes the section of the
+/// library: the kind, the capabilities of an instance (the words of [`describe`]), and its variables, each as
+/// `NAME ROLE TYPE UNIT`. A `*` in a name stands for a part that depends on parameters, units may have alternatives:
+/// `*.torque output f64 N m | N`. `check-module` compares it with an instance.
 ///
 /// ```ignore
 /// terraglue_plugin::export_subsystem! {

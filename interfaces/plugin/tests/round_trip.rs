@@ -1,5 +1,5 @@
 //! Every call of the interface through the C table gives the bits of the direct call, without an allocation per
-//! call, and every failure comes back as what it was.
+//! call, and every failure comes back unchanged.
 #![allow(unsafe_code, missing_docs, clippy::unwrap_used)]
 
 mod everything;

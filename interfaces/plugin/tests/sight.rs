@@ -174,7 +174,7 @@ fn names_and_scenes_are_copied_again_when_the_world_says_so() {
     world.scene.shapes.clear();
     world.names.swap(0, 1);
     world.revision += 1;
-    // the body that is asked for has gone with its scene
+    // the requested body has gone with its scene
     assert_eq!(through.observe(&STEP, &world), direct.observe(&STEP, &world));
     world.scene = direct.scene();
     world.names.swap(0, 1);

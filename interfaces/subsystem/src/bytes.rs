@@ -1,5 +1,5 @@
-//! States as bytes: compact, little-endian, with a version, with the mark of what they belong to, and with a hash, so
-//! that what was cut, changed or made by something else is refused before anything is taken over.
+//! States as bytes: compact, little-endian, with a version, with the mark of their owner, and with a hash, so that
+//! bytes that were cut, changed or made by something else are refused before anything is taken over.
 //!
 //! Integers are variable-length (LEB128, signed ones folded by zigzag: 0, −1, 1, …), so that the many zeros of a ground
 //! cost a byte each; numbers are the 8 bytes of an f64. A frame is `TGS1`, version, mark, content, FNV-1a of all before
@@ -29,7 +29,7 @@ pub trait Persist: Sized {
     /// Takes it from the front.
     ///
     /// # Errors
-    /// `Refused`: the bytes end too early, or say what no value of the type is.
+    /// `Refused`: the bytes end too early, or encode no value of the type.
     fn read(from: &mut &[u8]) -> Result<Self>;
 }
 
@@ -70,12 +70,12 @@ pub fn wrong(reason: &str) -> Error {
     Error::Refused(format!("these bytes are no state of this instance: {reason}"))
 }
 
-/// FNV-1a of 64 bits; also makes the mark of what a state belongs to.
+/// FNV-1a of 64 bits; also makes the mark of a state's owner.
 pub fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Bytes of a state. `version` is that of its form, `mark` tells what it belongs to: the same model, the same ground.
+/// Bytes of a state. `version` is that of its form, `mark` identifies its owner: the same model, the same ground.
 pub fn seal(version: u32, mark: u64, state: &impl Persist) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
     version.write(&mut out);

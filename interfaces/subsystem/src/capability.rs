@@ -29,7 +29,7 @@ impl Capabilities {
     pub const FIXED_STEP: Self = Self(4096);
     /// `observe` is implemented.
     pub const SEES: Self = Self(8192);
-    /// `shape_visibility` is implemented; without it all shapes are shown and nobody asks.
+    /// `shape_visibility` is implemented; without it all shapes are shown and it is not called.
     pub const HIDES: Self = Self(16384);
     /// Outputs at the end of a step depend directly on the inputs of that step, and values of a trial can be read before it is
     /// committed. Of FMUs; unknown to the C interface of modules.
@@ -60,7 +60,7 @@ impl Capabilities {
         self.0 & other.0 == other.0
     }
 
-    /// The names of what is in the set.
+    /// The names of the capabilities in the set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.iter().filter(move |(c, _)| self.has(*c)).map(|(_, name)| *name)
     }

@@ -33,7 +33,7 @@ impl Config {
         }
     }
 
-    /// The same with the defaults of the schema for what is missing.
+    /// The same with the defaults of the schema for missing values.
     pub fn with_defaults(mut self, schema: &Schema) -> Self {
         for p in &schema.parameters {
             if !p.default.is_null() && self.get(&p.name).is_none() {

@@ -29,12 +29,12 @@ pub struct Energy {
     /// never falls.
     pub dissipated: f64,
     /// Work done **on** this subsystem through its ports since the start. A soil takes the wrench of its own law, at the
-    /// motion that was committed, and not the wrench that it was told.
+    /// motion that was committed, and not the wrench that was passed to it.
     pub port_work: f64,
     /// Mechanical work that its own motors have put in since the start (Σ τ·ω·h, signed), and loads from outside.
     pub actuator_work: f64,
-    /// Electrical energy that its motors have drawn since the start, where a drive with losses says so; not a number for motors
-    /// that are ideal.
+    /// Electrical energy that its motors have drawn since the start, where a drive with losses computes it; not a number for
+    /// motors that are ideal.
     pub electrical: f64,
 }
 

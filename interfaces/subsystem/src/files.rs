@@ -1,4 +1,4 @@
-//! Reading input files whole, and creating output files, but never without end: devices and pipes are refused before a byte is read, and so is what is
+//! Reading input files whole, and creating output files, but never without end: devices and pipes are refused before a byte is read, and so are files
 //! larger than any input can be.
 
 use std::fs::File;
@@ -28,7 +28,7 @@ pub fn open(path: &Path) -> Result<File> {
     Err(Error::new(ErrorKind::InvalidInput, format!("it is {what}, not a regular file")))
 }
 
-/// Says before a file is created that nothing would come of it: a pipe that nobody reads holds up its writer for ever. Those of
+/// Reports before a file is created that it would block: a pipe without a reader holds up its writer for ever. Those of
 /// the shell and standard output, below `/dev` and `/proc`, have a reader.
 ///
 /// # Errors

@@ -26,7 +26,7 @@ pub trait Host: Send + Sync {
     fn parallel_for(&self, n: usize, job: &(dyn Fn(usize) + Sync)) {
         (0..n).for_each(job);
     }
-    /// Whether the user asked to stop; long calls look at it.
+    /// Whether the user requested a stop; long calls poll it.
     fn cancelled(&self) -> bool {
         false
     }
@@ -36,7 +36,7 @@ pub trait Host: Send + Sync {
     fn folder(&self) -> &str;
     /// Number of numbered states that `save_state` must keep.
     fn slots(&self) -> u32;
-    /// Largest number of ground nodes that a step may show; a hint for what to reserve.
+    /// Largest number of ground nodes that a step may show; a hint for the memory to reserve.
     fn max_nodes(&self) -> u32;
     /// Gravity in the world, m/s².
     fn gravity(&self) -> [f64; 3];
@@ -107,7 +107,7 @@ impl Host for Standalone {
 }
 
 impl dyn Host + '_ {
-    /// The terrain, or an error that says that this module needs one.
+    /// The terrain, or the error that this module needs one.
     ///
     /// # Errors
     /// [`Error::Failed`]: the scenario has no terrain.

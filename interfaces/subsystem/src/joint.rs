@@ -1,4 +1,4 @@
-//! Joints between the bodies of a scene: what a viewer draws, plots by name and offers for selection.
+//! Joints between the bodies of a scene, for viewers that draw them, plot them by name and offer them for selection.
 
 use crate::pose::Pose;
 

@@ -1,10 +1,10 @@
 //! Interface of everything that the coordinator steps: bodies, soils, controllers, FMUs.
 //!
-//! A plugin author reads this crate and nothing else. There are two traits: [`Module`], the static side
-//! (what it is, which parameters it takes, how to make one), and [`Subsystem`], an instance.
+//! A plugin author reads this crate and nothing else. There are two traits: [`Module`], the static side (description,
+//! parameters, construction), and [`Subsystem`], an instance.
 //!
 //! # Life of a subsystem
-//! 1. [`Module::schema`] says which parameters exist; the host checks the scenario against it.
+//! 1. [`Module::schema`] lists the parameters; the host checks the scenario against it.
 //! 2. [`Module::instantiate`] may allocate and read files below [`Host::folder`]. No later call does,
 //!    except when a count exceeds every earlier one.
 //! 3. Every step [t, t + h]: inputs are set; [`Subsystem::set_ports`]; any number of **trials**
@@ -13,7 +13,7 @@
 //!    [`Subsystem::commit`], which makes the last trial of `advance` or `solve_compatibility` the state at t + h.
 //! 4. After all subsystems have committed, those with [`Capabilities::SEES`] get one [`Subsystem::observe`] with the committed
 //!    [`World`], whose states lie between t and t + h.
-//! 5. `get`, `body_states`, fields, streams, overlays and `energy` speak of the committed state only.
+//! 5. `get`, `body_states`, fields, streams, overlays and `energy` refer to the committed state only.
 //!
 //! # Packed vectors
 //! T, X, V and A hold one entry per carried component of every port in the order of [`Step::ports`]; port p

@@ -6,7 +6,7 @@
 pub struct MaterialClass(pub u32);
 
 impl MaterialClass {
-    /// Nothing is said about it.
+    /// Not specified.
     pub const UNKNOWN: Self = Self(0);
     /// Metal.
     pub const METAL: Self = Self(1);
@@ -68,7 +68,7 @@ impl Material {
     pub fn wrong(&self) -> Option<&'static str> {
         let part = |x: f32| (0.0..=1.0).contains(&x);
         let sound = part(self.reflectance) && part(self.transmittance);
-        // what f32 rounds of two decimal numbers that add up to one
+        // allowance for the f32 rounding of two decimal numbers that add up to one
         let sound = sound && self.reflectance + self.transmittance <= 1.0 + 1e-6;
         (!sound).then_some("reflectance and transmittance lie from 0 to 1 and add up to at most 1")
     }

@@ -1,12 +1,12 @@
 //! A pressure and a shear law as a module of its own: two functions over arrays of nodes.
 //!
-//! A soil asks [`Host::law`](crate::Host::law) for the law that its scenario names. A law is stateless: what a node has to
-//! remember is a declared number of doubles that the soil owns, so rollback, snapshots and export need no code of the
-//! law. Depths and pressures grow into the soil, SI units throughout.
+//! A soil asks [`Host::law`](crate::Host::law) for the law that its scenario names. A law is stateless: the memory of a
+//! node is a declared number of doubles that the soil owns, so rollback, snapshots and export need no code of the law.
+//! Depths and pressures grow into the soil, SI units throughout.
 //!
 //! A law **without state** is the curve of first loading, p(z); below the largest depth reached the soil is elastic by the
-//! rule of the soil that uses it. A law **with state** answers for everything, unloading and reloading too, and says
-//! where the unloaded surface is. Of the shear law only the yield stress is asked; below it the soil is elastic.
+//! rule of the soil that uses it. A law **with state** covers everything, unloading and reloading too, and gives the
+//! position of the unloaded surface. The shear law provides the yield stress only; below it the soil is elastic.
 
 use crate::error::{Error, Result};
 use crate::schema::Schema;
@@ -100,7 +100,7 @@ pub trait NodeLaw: Send + Sync {
     fn as_any(&self) -> &dyn std::any::Any;
 }
 
-/// The static side of a law in Rust: what `export_law!` takes. Which of both functions exist is said by the constants.
+/// The static side of a law in Rust, for `export_law!`. The constants declare which of both functions exist.
 pub trait LawModule: 'static {
     /// Doubles per node that the soil keeps.
     const STATE_DOUBLES: usize = 0;

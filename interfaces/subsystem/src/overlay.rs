@@ -1,4 +1,4 @@
-//! Overlays: what a subsystem wants to show in three dimensions beside its bodies.
+//! Overlays: figures that a subsystem shows in three dimensions with its bodies.
 
 use crate::pose::Pose;
 
@@ -17,7 +17,7 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// The frame of what lies in the world.
+    /// The frame of figures in the world.
     pub const WORLD: u32 = u32::MAX;
     /// The frame of the body that the parameter [`crate::Mount::KEY`] names, without the offset.
     pub const MOUNT: u32 = u32::MAX - 1;

@@ -1,6 +1,6 @@
 //! Poses and motions.
 
-/// Position and orientation: `world_from_x` or `body_from_x` as the name of the value says.
+/// Position and orientation: `world_from_x` or `body_from_x` by the name of the value.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {

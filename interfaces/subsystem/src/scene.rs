@@ -121,7 +121,7 @@ pub struct SceneShape {
 }
 
 impl SceneShape {
-    /// Why nobody can see or hit this shape; none where it makes sense.
+    /// The fault of a shape that can be neither seen nor hit; none where it is valid.
     pub fn wrong(&self) -> Option<&'static str> {
         self.material.wrong().or_else(|| self.geometry.cannot_collide().filter(|_| self.collides))
     }

@@ -45,7 +45,7 @@ pub struct Parameter {
     pub unit: String,
     /// One line for people.
     pub help: String,
-    /// Value when the scenario is silent; null: required unless `optional`.
+    /// Value when the scenario does not set it; null: required unless `optional`.
     #[serde(default)]
     pub default: serde_json::Value,
     /// May be left out although there is no default.

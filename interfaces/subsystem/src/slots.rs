@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 pub struct Slots<T>(Vec<Option<T>>);
 
 impl<T: Clone> Slots<T> {
-    /// So many, all empty: as many as [`crate::Host::slots`] says.
+    /// `count` empty slots: as many as [`crate::Host::slots`].
     pub fn new(count: u32) -> Self {
         Self(vec![None; count as usize])
     }

@@ -1,4 +1,4 @@
-//! Streams: what a subsystem gives that is no variable, such as point clouds, images and maps.
+//! Streams: output of a subsystem that is no variable, such as point clouds, images and maps.
 //!
 //! A stream can feed an input of the type [`crate::ValueType::Binary`] of another subsystem: each message is one
 //! [`crate::Subsystem::set`] at the start of the step after the one that made it.
@@ -14,7 +14,7 @@ pub struct StreamInfo {
     pub encoding: String,
     /// Most messages per second, 1/s; 0: whenever something happens.
     pub rate_hz: f64,
-    /// Most bytes of a message. What is longer is left out with a warning.
+    /// Most bytes of a message. Longer ones are dropped with a warning.
     pub most_bytes: u32,
     /// One line for people.
     pub help: String,
@@ -23,7 +23,7 @@ pub struct StreamInfo {
 /// A message of a stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Message<'a> {
-    /// Time of what it tells, s.
+    /// Time of its content, s.
     pub time: f64,
     /// Its bytes, in the encoding of its stream.
     pub bytes: &'a [u8],

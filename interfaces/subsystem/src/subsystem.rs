@@ -30,14 +30,14 @@ pub trait Module {
     fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;
 }
 
-/// An instance. Only `capabilities` and `advance` are required; what else is offered is declared as a capability.
+/// An instance. Only `capabilities` and `advance` are required; everything else is declared as a capability.
 ///
 /// Calls come from one thread at a time.
 pub trait Subsystem: Send {
     /// Capabilities of this instance.
     fn capabilities(&self) -> Capabilities;
 
-    /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+    /// Paper, step 1. The ports of this step (grounds come first). Returns the committed X, V and,
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan φ, t_max), one
     /// per port; a ground's `x` along n is its own continuous surface x2 below the body, from its unrounded state.
     /// The default suits a body: its origin lies on itself, and it has no force of its own.
@@ -106,11 +106,11 @@ pub trait Subsystem: Send {
 
     /// Looks at the committed world. Called once per step of an instance with [`Capabilities::SEES`], after all subsystems
     /// have committed the step and before anything reads them; `step` is the one that was committed, or has h = 0 at the
-    /// start of a run. What was seen belongs to the committed state: variables, streams and `save_state` tell it from t + h on.
-    /// Nothing of `world` may be kept.
+    /// start of a run. Observations belong to the committed state: variables, streams and `save_state` contain it from t + h
+    /// on. Nothing of `world` may be kept.
     ///
     /// # Errors
-    /// [`Error::Failed`]: what was seen cannot be told.
+    /// [`Error::Failed`]: the world cannot be evaluated.
     fn observe(&mut self, _step: &Step, _world: &dyn World) -> Result {
         Ok(())
     }
@@ -188,7 +188,7 @@ pub trait Subsystem: Send {
     /// [`Capabilities::OUTPUT_DERIVATIVES`] after its first step.
     ///
     /// # Errors
-    /// [`Error::Unsupported`]: not offered. [`Error::Failed`]: it cannot be told.
+    /// [`Error::Unsupported`]: not offered. [`Error::Failed`]: they cannot be computed.
     fn output_derivatives(&self, _ids: &[u32], _out: &mut [f64]) -> Result {
         Err(Error::Unsupported)
     }
@@ -219,7 +219,7 @@ pub trait Subsystem: Send {
     /// Committed states of the scene's bodies, in its order.
     ///
     /// # Errors
-    /// [`Error::Failed`]: the states cannot be told.
+    /// [`Error::Failed`]: the states cannot be computed.
     fn body_states(&self, _out: &mut [BodyState]) -> Result {
         Ok(())
     }
@@ -229,7 +229,7 @@ pub trait Subsystem: Send {
     /// [`Capabilities::HIDES`]; of any other all are shown. Contact with soil does not ask for it.
     ///
     /// # Errors
-    /// [`Error::Failed`]: it cannot be told.
+    /// [`Error::Failed`]: it cannot be determined.
     fn shape_visibility(&self, out: &mut [bool]) -> Result {
         out.fill(true);
         Ok(())
@@ -249,8 +249,8 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
-    /// Appends overlays of the committed state, shown beside the bodies, to `out`. Called only when somebody looks or a
-    /// recording asks, so it may cost what it needs.
+    /// Appends overlays of the committed state, shown with the bodies, to `out`. Called only when they are displayed or
+    /// recorded, so it may be expensive.
     fn overlays(&self, _out: &mut Vec<Overlay>) {}
 
     /// Fields over the ground. `height`, where offered, is the surface that contact detection reads.

@@ -52,7 +52,7 @@ pub enum Input<'a> {
     Motion(Motion<'a>),
 }
 
-/// Level at which a derivative is asked for.
+/// Level at which a derivative is requested.
 #[repr(u32)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Level {
@@ -73,7 +73,7 @@ pub struct Motion<'a> {
     pub v: &'a [f64],
 }
 
-/// Answer of a trial at its end; packed. Comes filled with NaN: what stays NaN is an error of the subsystem.
+/// Answer of a trial at its end; packed. Comes filled with NaN: an entry that stays NaN is an error of the subsystem.
 #[derive(Debug)]
 pub struct Response<'a> {
     /// Own displacement X.

@@ -56,7 +56,7 @@ impl Unit {
     /// A pure number.
     pub const ONE: Self = Self { exponents: [0; 8], factor: 1.0, offset: 0.0 };
 
-    /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`, `A/(N m)`. What follows a `/` is divided, up to the end,
+    /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`, `A/(N m)`. Everything after a `/` divides, up to the end,
     /// with or without parentheses. `× 0.3048` and `+ 273.15` at the end are a factor and an offset to SI.
     ///
     /// # Errors

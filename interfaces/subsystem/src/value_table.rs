@@ -1,5 +1,5 @@
-//! The values of a module whose variables are single numbers, truth values and choices: what to answer and what to refuse when they
-//! are read and set.
+//! The values of a module whose variables are single numbers, truth values and choices: answers and refusals when they are read and
+//! set.
 
 use crate::error::{Error, Result};
 use crate::variable::{Causality, ValueType, Values, ValuesMut, Variable};

@@ -1,16 +1,16 @@
 //! Sight of a subsystem: the bodies, shapes and grounds of all others, and rays through them.
 //!
-//! # Of what time an answer is
-//! [`crate::Subsystem::observe`] comes once per step [t, t + h], after all subsystems have committed it. Everything that is asked
-//! is of the time that the question names, within [t, t + h] ([`World::interval`]): moving bodies stand where a motion between
-//! their committed states at t and t + h carries them (on a straight line, turning at a constant rate about one axis), so nothing
-//! is older or younger than the question, and nothing of what comes after t + h is known. Times outside of the interval are
-//! answered with its nearest end. The interval is the last communication step also for a sensor that makes a step only every
-//! n-th. The ground and the visibility of shapes are those at t + h. A body that makes a step only every n-th communication
-//! point moves when it commits.
+//! # Time of an answer
+//! [`crate::Subsystem::observe`] comes once per step [t, t + h], after all subsystems have committed it. Every answer is for the
+//! time that the question names, within [t, t + h] ([`World::interval`]): moving bodies stand where a motion between their
+//! committed states at t and t + h carries them (on a straight line, turning at a constant rate about one axis), so nothing is
+//! older or younger than the question, and nothing after t + h is known. Times outside of the interval are answered with its
+//! nearest end. The interval is the last communication step also for a sensor that makes a step only every n-th. The ground and
+//! the visibility of shapes are those at t + h. A body that makes a step only every n-th communication point moves when it
+//! commits.
 //!
-//! Answers depend on the question and the committed states alone, never on threads, on the order of subsystems or on what was
-//! asked before.
+//! Answers depend on the question and the committed states alone, never on threads, on the order of subsystems or on earlier
+//! questions.
 
 use crate::error::{Error, Result};
 use crate::field::{FieldInfo, FieldTile};
@@ -18,7 +18,7 @@ use crate::material::Material;
 use crate::pose::BodyState;
 use crate::scene::Scene;
 
-/// The committed world at the end of a step, and within the step interpolated to the time asked for.
+/// The committed world at the end of a step, and within the step interpolated to the requested time.
 ///
 /// Subsystems are numbered in the order of the scenario; [`World::subsystems`] names them.
 pub trait World {
@@ -27,13 +27,13 @@ pub trait World {
         self.interval()[1]
     }
 
-    /// Changes whenever names or scenes of subsystems do, as by an exchange of code while a run goes on: what was copied of
-    /// them under the same number still holds.
+    /// Changes whenever names or scenes of subsystems do, as by an exchange of code while a run goes on: copies made of
+    /// them under the same number stay valid.
     fn revision(&self) -> u64 {
         0
     }
 
-    /// First and last time that can be asked for, s.
+    /// First and last time of a query, s.
     fn interval(&self) -> [f64; 2];
 
     /// Names of all subsystems; their numbers are places in this list.
@@ -69,7 +69,7 @@ pub trait World {
     fn overlap(&self, centre: [f64; 3], radius: f64, mask: &RayMask, found: &mut Vec<ShapeRef>);
 
     /// Fields of a subsystem as committed at t + h; empty: it has none. Those of a subsystem that sees itself are not shown, as
-    /// they may change while the world is looked at.
+    /// they may change during its own look.
     fn fields(&self, _subsystem: u32) -> &[FieldInfo] {
         &[]
     }
@@ -141,7 +141,7 @@ pub struct Ray {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// Distance from the start, m; ∞: nothing was met, and the rest says nothing.
+    /// Distance from the start, m; ∞: nothing was met, and the rest is meaningless.
     pub distance: f64,
     /// Unit normal of the surface, world, against the ray.
     pub normal: [f64; 3],

@@ -4,7 +4,7 @@
 //! * `stand.rs`: where trees stand: grown by published distributions.
 //! * `scene.rs`: the shapes of a stand, for [`terraglue_subsystem::World`].
 //! * `module.rs`: a stand in a scenario.
-//! * `survey.rs`: maps of a stand as somebody would make them: noise, missing and extra trees.
+//! * `survey.rs`: maps of a stand as a survey makes them: noise, missing and extra trees.
 
 #![warn(clippy::unwrap_used)]
 

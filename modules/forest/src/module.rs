@@ -30,11 +30,11 @@ pub struct Forest {
     slots: Slots<Told>,
 }
 
-/// Whether the map has been told.
+/// Whether the map has been published.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Told {
     is_over: bool,
-    /// When it was told, if the last step did so, s.
+    /// Time of its publication, if the last step did so, s.
     now: Option<f64>,
 }
 persist!(Told { is_over, now });
@@ -170,7 +170,7 @@ fn corners(numbers: &[f64]) -> Result<Vec<[f64; 2]>> {
     Ok(corners.to_vec())
 }
 
-/// The map that a survey makes of a stand, as a table. Trees are told from west to east, so that the real ones among them do not come first.
+/// The map that a survey makes of a stand, as a table. Trees are listed from west to east, so that the real ones do not come first.
 fn table(survey: &Survey, stand: &Stand, seed: u64) -> String {
     let mut places: Vec<[f64; 2]> = survey.of(stand, !seed).iter().map(|s| s.place).collect();
     places.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));

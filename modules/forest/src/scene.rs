@@ -44,7 +44,7 @@ pub fn plants(stand: &Stand, seed: u64) -> Plants {
 }
 
 impl Plants {
-    /// All shapes on one body at the origin that a joint holds for ever, so that nothing has to be told of it in a step. Ids of shapes are
+    /// All shapes on one body at the origin that a joint holds for ever, so that it has no states to report in a step. Ids of shapes are
     /// the same.
     pub fn as_one_body(&self, name: &str) -> Scene {
         let whole = |s: &SceneShape| {

@@ -89,7 +89,7 @@ const TRIES: usize = 200;
 impl Stand {
     /// Grows trees one after the other, each at a place drawn anew until it is far enough from the others (simple sequential
     /// inhibition: B. D. Ripley, "Modelling spatial patterns", 1977), with diameters of a Weibull distribution (R. L. Bailey and
-    /// T. R. Dell, "Quantifying diameter distributions with the Weibull function", 1973). What finds no place is left out.
+    /// T. R. Dell, "Quantifying diameter distributions with the Weibull function", 1973). Trees that find no place are omitted.
     pub fn grow(growth: &Growth, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let hectares = 4e-4 * growth.half_m * growth.half_m;

@@ -1,4 +1,4 @@
-//! Maps of a stand as somebody makes them: places with noise, trees that were missed, and trees that are not there.
+//! Maps of a stand as a survey makes them: places with noise, trees that were missed, and trees that are not there.
 
 use crate::stand::Stand;
 use terraglue_numerics::random::Random;

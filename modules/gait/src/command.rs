@@ -22,7 +22,7 @@ pub struct Command {
     pub heading_feedback: bool,
     /// Measured roll, pitch and yaw of the body, rad.
     pub attitude: [f64; 3],
-    /// Measured normal force on each foot, N; none where nobody has ever told it.
+    /// Measured normal force on each foot, N; none where it was never set.
     pub contact: [Option<f64>; LEGS],
 }
 

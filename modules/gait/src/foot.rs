@@ -106,8 +106,8 @@ pub struct Foot {
     pub searching: bool,
     /// Whether it has pressed on ground since its last swing.
     pub found: bool,
-    /// Whether it has looked for ground down to the limit without finding it, and has found none since: nobody waits for
-    /// it, as the leg may be gone.
+    /// Whether it has looked for ground down to the limit without finding it, and has found none since: the gait does
+    /// not wait for it, as the leg may be gone.
     pub missing: bool,
     lift_off: [f64; 2],
     lift: f64,
@@ -271,7 +271,7 @@ impl Foot {
         }
     }
 
-    /// The body moves on by `dt` s while the cycle stands still: what stands passes below it, what flies hovers.
+    /// The body moves on by `dt` s while the cycle stands still: standing feet pass below it, swinging ones hover.
     fn wait(&mut self, cycle: &Cycle, neutral: [f64; 2], dt: f64) {
         if self.airborne {
             self.swing(cycle, Self::touch_down(cycle, neutral), dt);

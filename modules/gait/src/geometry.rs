@@ -73,8 +73,8 @@ impl Leg {
         [(l2 - l3).abs() + REACH_MARGIN * (l2 + l3), (1.0 - REACH_MARGIN) * (l2 + l3)]
     }
 
-    /// Largest distance of the foot forward of the hip (m) when it is `outward` m beside and `below` m under it; None:
-    /// it cannot stand there.
+    /// Largest distance of the foot forward of the hip (m) when it is `outward` m outward of and `below` m under it;
+    /// None: it cannot stand there.
     pub fn stride_reach(&self, outward: f64, below: f64) -> Option<f64> {
         let [_, largest] = self.reach();
         let drop = self.links[3] - below;

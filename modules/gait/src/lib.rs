@@ -4,7 +4,7 @@
 //! body and `L.contact_force` of each leg L, and offers `J.angle_target` for each joint J.
 //!
 //! # How a target comes about
-//! 1. [`walker`]: a command (speed, turn rate, heading) becomes a planar twist of the body, within what the legs reach.
+//! 1. [`walker`]: a command (speed, turn rate, heading) becomes a planar twist of the body, within the legs' reach.
 //! 2. [`pattern`]: each leg runs through its own cycle, first on the ground, then in the air.
 //! 3. [`foot`]: on the ground a foot stays where it is in the world, so it moves against the twist in the body frame;
 //!    in the air it flies to where its next stance has to begin, until it presses on the ground.

@@ -13,7 +13,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// Takes in the forces (N) over the next `dt` s. What presses the wrong way counts as nothing.
+    /// Takes in the forces (N) over the next `dt` s. Forces in the wrong direction count as zero.
     pub fn advance(&mut self, forces: &[Option<f64>; LEGS], dt: f64) {
         let sum: f64 = forces.iter().flatten().map(|f| f.max(0.0)).sum();
         self.passed_s = (self.passed_s + dt).min(WINDOW_S.max(dt));

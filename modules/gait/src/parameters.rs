@@ -17,7 +17,7 @@ pub struct Settings {
     pub neutral: [[f64; 2]; LEGS],
     /// Height of the hips above the foot centres, m.
     pub body_height: f64,
-    /// Longest way of a foot on the ground in the body frame, m: the parameter or what the legs reach.
+    /// Longest way of a foot on the ground in the body frame, m: the parameter or the reach of the legs.
     pub stride_limit: f64,
     /// In which frame a swing begins and ends at rest.
     pub swing: Swing,

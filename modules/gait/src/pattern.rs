@@ -44,7 +44,7 @@ impl Pattern {
         }
     }
 
-    /// Duration of a cycle where a scenario is silent, s.
+    /// Default duration of a cycle, s.
     pub fn cycle_s(self) -> f64 {
         match self {
             Self::Tripod => 1.2,

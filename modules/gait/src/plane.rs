@@ -1,4 +1,4 @@
-//! The plane through the feet that stand: what of their heights is height and tilt of the body, and what is the ground's.
+//! The plane through the standing feet: it separates height and tilt of the body from the relief of the ground.
 
 /// z = height + slope · (p − centre).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! The variables of the module: one table of names, and what each one reads and writes.
+//! The variables of the module: one table of names, and the access to each one.
 
 use crate::command::Command;
 use crate::geometry::{JOINTS, LEG_NAMES, LEGS};

@@ -89,7 +89,7 @@ impl Walker {
         self.aim(settings);
     }
 
-    /// Stands still for what remains of the waiting time; the time of the step that is left for walking, s.
+    /// Stands still for the rest of the waiting time; the time of the step that is left for walking, s.
     fn wait(&mut self, command: &Command, dt: f64) -> f64 {
         let Mode::Standing(wait) = self.mode else { return dt };
         if wait >= dt || !moves(command) {
@@ -188,7 +188,7 @@ impl Walker {
         command.contact[leg].map(|force| Sensed { force, threshold, search: *search })
     }
 
-    /// The body goes back to its height above the feet that stand on ground. Where nobody measures its tilt, it goes
+    /// The body goes back to its height above the feet that stand on ground. Where its tilt is not measured, it goes
     /// parallel to them, too.
     fn level(&mut self, search: &Search, command: &Command, dt: f64) {
         let stands = |f: &Foot| !f.airborne && !f.searching && f.found;

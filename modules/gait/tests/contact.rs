@@ -12,7 +12,7 @@ use terraglue_subsystem::Subsystem;
 const STEADY: &str = r#""posture_feedback": false, "heading_feedback": false"#;
 /// Stiffness of the ground of these tests, N/m, under a body that a hand leads at its height.
 const STIFFNESS: f64 = 2000.0;
-/// A load on each foot that makes the thresholds what they are under a robot, N.
+/// A load on each foot that gives the thresholds their values under a robot, N.
 const LOAD: f64 = 10.0;
 
 /// The gait walks over ground of these heights, one per leg, m; `noise` is added to each force, N.

@@ -1,4 +1,4 @@
-//! Inverse kinematics against forward kinematics over the workspace, and what happens at its edge.
+//! Inverse kinematics against forward kinematics over the workspace, and behaviour at its edge.
 
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};

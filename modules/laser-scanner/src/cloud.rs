@@ -1,9 +1,9 @@
-//! The points of a turn, and the message `foxglove.PointCloud` that tells them, written by hand: a module needs no viewer's library
-//! for nine fields (<https://docs.foxglove.dev/docs/visualization/message-schemas/point-cloud>).
+//! The points of a turn, and the message `foxglove.PointCloud` that carries them, written by hand: a module needs no viewer's
+//! library for nine fields (<https://docs.foxglove.dev/docs/visualization/message-schemas/point-cloud>).
 
 use terraglue_subsystem::{Pose, persist};
 
-/// A point that a scanner tells.
+/// A point that a scanner reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Told {
     /// Place in the frame of the scanner when the ray left, m.
@@ -25,7 +25,7 @@ persist!(Told { position, time, intensity, ring, subsystem, body, shape });
 
 /// Bytes of a point.
 pub const STRIDE: usize = 32;
-/// Bytes of a message beside its points, at most.
+/// Bytes of a message without its points, at most.
 pub const HEAD: usize = 600;
 /// Names, places and types of the numbers of a point.
 const FIELDS: [(&str, u32, u64); 9] = [

@@ -1,4 +1,4 @@
-//! From the true distance of a ray to what the scanner tells: noise, bias, limits and drop-out, each drawn from the number of the ray.
+//! From the true distance of a ray to the reported range: noise, bias, limits and drop-out, each drawn from the number of the ray.
 
 use terraglue_numerics::random::{mixed, normal, uniform};
 
@@ -15,17 +15,17 @@ use terraglue_numerics::random::{mixed, normal, uniform};
 pub struct RayErrors {
     /// Deviation of a range at the scanner, m.
     pub noise_m: f64,
-    /// What that deviation gains with each metre of range, m/m.
+    /// Growth of that deviation with range, m/m.
     pub noise_per_m: f64,
     /// Deviation of azimuth and of elevation, rad.
     pub angle_rad: f64,
     /// Added to all ranges, m.
     pub bias_m: f64,
-    /// Nearest and farthest range that is told, m.
+    /// Smallest and largest range that is reported, m.
     pub limits_m: [f64; 2],
     /// Probability that a ray is lost.
     pub drop_out: f64,
-    /// Probability per metre of range that a ray is lost, beside that, 1/m.
+    /// Probability per metre of range that a ray is lost, in addition, 1/m.
     pub drop_out_per_m: f64,
     /// Probability that a ray along a surface is lost: it grows with (1 − cos i)² of the angle of incidence i.
     pub drop_out_grazing: f64,
@@ -50,8 +50,8 @@ impl RayErrors {
         drop_out_grazing: 0.0,
     };
 
-    /// What the ray with this number tells of a surface at a distance, m, met with this cosine of the angle of incidence; none: it
-    /// is lost.
+    /// Range that the ray with this number reports of a surface at a distance, m, under this cosine of the angle of incidence;
+    /// none: it is lost.
     pub fn range(&self, seed: u64, ray: u64, distance: f64, cosine: f64) -> Option<f64> {
         let place = mixed(ray);
         let lost = self.loss(distance, cosine) > uniform(seed ^ LOSS, place);

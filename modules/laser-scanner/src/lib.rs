@@ -1,8 +1,8 @@
 //! Laser scanners: patterns of beams, motion within a turn, and the errors of a ray.
 //!
 //! * `pattern.rs`: which beams a turn has, in which direction and when.
-//! * `errors.rs`: from the true distance of a ray to what the scanner tells.
-//! * `faults.rs`: what can be changed while a run goes on.
+//! * `errors.rs`: from the true distance of a ray to the reported range.
+//! * `faults.rs`: settings that can be changed during a run.
 //! * `cloud.rs`: the points of a turn as a message.
 //! * `scanner.rs`, `settings.rs`: the module.
 

@@ -122,7 +122,7 @@ impl LaserScanner {
         Ok(())
     }
 
-    /// Meets what the rays from a column on meet, and keeps what is told of it.
+    /// Casts the rays from a column on, and returns the points that are reported.
     fn tell(&mut self, first: (u64, u32), skip: BodyRef, world: &dyn World) -> Vec<Told> {
         self.hits.clear();
         self.hits.resize(self.rays.len(), RayHit::MISS);

@@ -18,7 +18,7 @@ pub(crate) struct Settings {
 
 /// Most rays of a turn.
 const MOST_RAYS: usize = 1_000_000;
-/// Name of the pattern whose beams stand in the scenario.
+/// Name of the pattern whose beams are given in the scenario.
 const TABLE: &str = "table";
 
 /// Name, kind and parameters.

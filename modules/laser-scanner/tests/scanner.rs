@@ -115,7 +115,7 @@ fn every_ray_meets_a_wall_from_its_own_time_and_pose() {
     let mut edge = f64::MIN;
     assert!(s.last_turn().len() > 1000 && s.last_turn().len() == turns[1].1.len());
     for told in s.last_turn() {
-        // each lies on the wall and tells the time at which its column fires
+        // each lies on the wall and has the time at which its column fires
         let [x, y, _] = told.position;
         assert!((x - WALL).abs() < 1e-9 && told.subsystem == 1 && told.ring < 16);
         let share = (libm::atan2(y, x) / std::f64::consts::TAU).rem_euclid(1.0);
@@ -126,7 +126,7 @@ fn every_ray_meets_a_wall_from_its_own_time_and_pose() {
         edge = edge.max(place);
     }
     assert!(edge > 1.0 - 2.0 * WALL * pattern.azimuth_step(), "{edge}");
-    // the message says the same in single precision
+    // the message has the same values in single precision
     for (told, ([x, _, _, _, time], ring, subsystem)) in s.last_turn().iter().zip(&turns[1].1) {
         assert!((x - WALL).abs() < 1e-6 && (turns[1].0 + time - told.time).abs() < 1e-6);
         assert!(u32::from(*ring) == told.ring && *subsystem == 1);

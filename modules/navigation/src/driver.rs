@@ -179,7 +179,7 @@ fn length(points: &[[f64; 2]]) -> f64 {
     points.windows(2).map(|p| gap(p[0], p[1])).sum()
 }
 
-/// Way to the nearest point of the way that is not far behind what was passed, m, and the distance from it, m.
+/// Position on the way of its nearest point that is not far behind `passed`, m, and the distance from it, m.
 fn nearest(points: &[[f64; 2]], at: [f64; 2], passed: f64) -> (f64, f64) {
     /// How far it may have come back or gone on between two looks, m.
     const REACH: f64 = 10.0;

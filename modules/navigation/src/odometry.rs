@@ -30,7 +30,7 @@ pub struct Odometry {
     radius_m: f64,
     drift_rad_s: f64,
     table: ValueTable,
-    /// What the trial shows: x, y, yaw, speed, rate of turning.
+    /// Outputs of the trial: x, y, yaw, speed, rate of turning.
     trial: [f64; 5],
     /// Place without the shift.
     place: [f64; 2],

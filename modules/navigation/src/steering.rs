@@ -19,7 +19,7 @@ impl Steering {
         if length > 0.0 { libm::sin(angle) / length } else { 0.0 }
     }
 
-    /// Angle that makes a curvature, within what the joint allows: sin γ − κ l1 cos γ = κ l2, solved for γ.
+    /// Angle that makes a curvature, within the limits of the joint: sin γ − κ l1 cos γ = κ l2, solved for γ.
     pub fn angle(&self, curvature: f64) -> f64 {
         let (a, b) = (curvature * self.front_m, curvature * self.rear_m);
         let length = libm::sqrt(1.0 + a * a);

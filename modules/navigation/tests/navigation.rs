@@ -1,4 +1,4 @@
-//! The modules against what their errors and ways must be in closed form, and what they refuse.
+//! The errors and ways of the modules against closed forms, and their refusals.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::sync::Arc;

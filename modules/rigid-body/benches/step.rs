@@ -24,7 +24,7 @@ fn standing() -> Fixture {
     fixture
 }
 
-/// Linearisation, factorisation and one solve: what the first trial of a step costs.
+/// Linearisation, factorisation and one solve: the cost of the first trial of a step.
 #[divan::bench]
 fn prepare_factor_solve(bencher: Bencher) {
     let mut fixture = standing();

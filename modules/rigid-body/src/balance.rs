@@ -1,4 +1,4 @@
-//! Energy of the committed state, and how far its joints are out of place: what a run is judged by.
+//! Energy of the committed state, and the gaps of its joints: the criteria of a run.
 
 use crate::actuator::Drivetrain;
 use crate::closure::Poses;
@@ -7,8 +7,8 @@ use crate::model::Model;
 use crate::state::State;
 use terraglue_subsystem::Energy;
 
-/// Kinetic and potential energy beside the sums that the state keeps. What the motors drew is unknown unless a drive train
-/// with losses says it: an ideal motor has none, and the work that it does is no figure of what a supply has to give.
+/// Kinetic and potential energy, and the sums that the state keeps. The energy drawn by the motors is unknown without a
+/// drive train with losses: the work of an ideal motor is no measure of the energy that a supply has to give.
 pub(crate) fn energy(model: &Model, state: &State) -> Energy {
     let (mut kinetic, mut potential) = (0.0, 0.0);
     for (body, m) in model.bodies.iter().zip(&state.bodies) {
@@ -29,7 +29,7 @@ pub(crate) fn energy(model: &Model, state: &State) -> Energy {
     Energy { kinetic, potential, electrical, ..state.energy }
 }
 
-/// Largest gap of a joint or of what closes a loop, in any of its rows, m or rad.
+/// Largest gap of a joint or a loop closure, in any of its rows, m or rad.
 pub(crate) fn widest_gap(model: &Model, state: &State) -> f64 {
     let joints = model.joints.iter().zip(&state.joints).filter(|(_, s)| !s.broken);
     let mut widest = joints.flat_map(|(joint, _)| gap(joint, &state.bodies)).fold(0.0, wider);

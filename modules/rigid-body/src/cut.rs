@@ -2,8 +2,8 @@
 //!
 //! The joint itself stays with the part beyond it, with its motor, stops and friction. The link above the joint is
 //! divided: a share of its mass and inertia goes with the joint, the rest stays, and `[[glue]]` welds both pieces, which
-//! move as one. So any joint can be cut, and the glue transmits what the link transmitted there. Shapes stay with the
-//! root's piece. Both parts start from the pose and the rates of the whole robot.
+//! move as one. So any joint can be cut, and the glue transmits the wrench that the link transmitted there. Shapes stay
+//! with the root's piece. Both parts start from the pose and the rates of the whole robot.
 
 use crate::joint::Joint;
 use crate::math::V3;
@@ -46,7 +46,7 @@ enum Side {
     Tip,
 }
 
-/// Keeps the part that the scenario wants; `file` follows in what it says of couplings and loops.
+/// Keeps the part that the scenario selects, also of the couplings and loops in `file`.
 pub(crate) fn keep(
     config: &Config,
     base: &Isometry3<f64>,
@@ -213,7 +213,7 @@ fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
     list.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
-/// Leaves in the model what stays; a divided link at the root of the part moves freely from where it is.
+/// Reduces the model to the part that stays; a divided link at the root of the part moves freely from where it is.
 fn shrink(
     model: &mut Model,
     base: &Isometry3<f64>,

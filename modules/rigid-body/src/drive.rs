@@ -32,7 +32,7 @@ pub(crate) struct Span {
     pub supply_v: f64,
     /// Rate by which a rigid motor gives way at its largest torque, see [`YIELDING`].
     pub yielding: f64,
-    /// Whether rates may jump: end stops then throw back what hits them.
+    /// Whether rates may jump: end stops then throw the joint back.
     pub impacts: bool,
 }
 

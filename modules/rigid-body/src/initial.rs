@@ -93,7 +93,7 @@ fn early(state: &State) -> Result {
     }
 }
 
-/// Places what hangs on joints that hold, parents first.
+/// Places the bodies on joints that hold, parents first.
 fn follow(model: &Model, state: &mut State) {
     for (b, above) in model.joint_above.iter().enumerate() {
         let Some(j) = *above else { continue };

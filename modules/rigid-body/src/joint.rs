@@ -1,4 +1,4 @@
-//! A joint between two bodies: what it leaves free, and where it sits in both.
+//! A joint between two bodies: its freedoms, and its place in both.
 
 use crate::math::{Q, V3};
 use terraglue_robot_import as import;

@@ -7,17 +7,17 @@
 //! | `module`, `schema`, `objects`, `placement` | from parameters and robot files to an instance on the ground |
 //! | `cut` | one part of a robot that a scenario divides at joints |
 //! | `robot` | an instance and the calls of the interface |
-//! | `model`, `joint`, `state`, `motion`, `motor` | what stays and what changes |
+//! | `model`, `joint`, `state`, `motion`, `motor` | constant data and state |
 //! | `dynamics` | one step: its start, the whole KKT matrix with the rows of the joints, branches of the axes, trial, corrections |
-//! | `drive` | what acts along the free axis of a joint: motor, friction, limits, brake |
-//! | `closure` | what connects bodies beyond the tree: loops, rods, springs, couplings |
+//! | `drive` | forces along the free axis of a joint: motor, friction, limits, brake |
+//! | `closure` | connections beyond the tree: loops, rods, springs, couplings |
 //! | `actuator` | windings, gears, friction, heat, battery, energy |
 //! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
 //! | `lcp` | pivoting methods, from the crate `contact-solver` |
 //! | `balance` | energy and gaps of the committed state |
-//! | `variables`, `initial`, `scene` | what can be read, set (also of the motion before the start), done and seen |
+//! | `variables`, `initial`, `scene` | variables, settings (also of the motion before the start), actions and the scene |
 //!
-//! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
+//! Deliberately absent: ground and soil. The robot knows its ports only.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
 
-/// Vector, world axes unless said otherwise.
+/// Vector, world axes unless stated otherwise.
 pub(crate) type V3 = Vector3<f64>;
 /// 3 × 3 matrix.
 pub(crate) type M3 = Matrix3<f64>;

@@ -112,7 +112,7 @@ fn summary(name: &str, model: &Model) -> String {
     format!("{name}: {bodies} bodies, {joints} joints, {:.6} kg", model.mass())
 }
 
-/// Counts the rows that loops promise in vain, and takes from the initial rates what loops do not allow.
+/// Counts the redundant rows of loops, and removes from the initial rates the parts that loops do not allow.
 fn close_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> Result<()> {
     if dynamics.model.closures.is_empty() {
         return Ok(());
@@ -320,7 +320,7 @@ fn joint_states(
     states.map(start).collect()
 }
 
-/// `said`: the scenario without defaults; where it is silent the robot file speaks.
+/// `said`: the scenario without defaults; the robot file fills its gaps.
 fn joint_state(
     (config, said): (&Config, &Config),
     model: &Model,

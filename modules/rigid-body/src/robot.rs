@@ -229,7 +229,7 @@ impl Robot {
             let e = &mut state.energy;
             e.actuator_work += shares.motor * axis.mean_rate;
             // A brake or a stop that catches a moving joint turns its energy into heat, and so does friction; the
-            // implicit spring loses what it does not store.
+            // implicit spring loses the work that it does not store.
             let passive = shares.stop + shares.friction + shares.damper + shares.spring;
             e.dissipated -= passive * axis.mean_rate + s.actuator.stored(s.angle).0 - spring;
             e.electrical += s.actuator.ledger.electrical_power * h;
@@ -278,7 +278,7 @@ impl Robot {
         displacement(step.ports, &self.dynamics, &mut self.scratch.free);
         for port in step.ports {
             for (i, c) in port.components() {
-                // The work on both sides is T·X; what an impact kicks out of the body is lost.
+                // The work on both sides is T·X; the energy that an impact takes from the body is lost.
                 let push = self.ports.side(i) * t[i];
                 self.state.energy.port_work += push * self.scratch.free[i];
                 if !self.dynamics.integrator.is_second_order() {
@@ -535,7 +535,7 @@ impl Subsystem for Robot {
         for ((out, body), motion) in out.iter_mut().zip(&self.model().bodies).zip(&self.state.bodies) {
             *out = scene::body_state(body, motion);
         }
-        // what stands still, where the scene has it
+        // fixed shapes, where the scene has them
         out.iter_mut().skip(self.state.bodies.len()).for_each(|out| *out = BodyState::REST);
         Ok(())
     }

@@ -12,9 +12,9 @@ use terraglue_subsystem::{
     BodyState, Geometry, JointKind, JointVariables, Material, Pose, Scene, SceneBody, SceneJoint, SceneShape,
 };
 
-/// Name of the body that carries what stands still; `world'`, … where a robot has a body of that name.
+/// Name of the body that carries the fixed shapes; `world'`, … where a robot has a body of that name.
 const WORLD: &str = "world";
-/// A height field is drawn with at most this many nodes along a side: it is looked at, not calculated with.
+/// A height field is drawn with at most this many nodes along a side: it is for display only.
 const DRAWN_NODES: usize = 129;
 
 /// All bodies and shapes; ids count through the shapes.
@@ -77,7 +77,7 @@ fn held(name: &str, child: usize) -> SceneJoint {
     }
 }
 
-/// A place on a body, told from its centre of mass, or in the world.
+/// A place on a body, relative to its centre of mass, or in the world.
 fn place(model: &Model, body: Option<usize>, point: &V3, turn: Q) -> (u32, Pose) {
     let at = body.map_or(*point, |b| model.bodies[b].com + point);
     (body.map_or(SceneJoint::WORLD, |b| b as u32), pose(&Isometry3::from_parts(at.into(), turn)))
@@ -115,8 +115,7 @@ fn closure(model: &Model, c: &Closure) -> Option<SceneJoint> {
     Some(SceneJoint { parent, parent_from_joint, axis, ..held(&c.name, child) })
 }
 
-/// A mesh of a body that is not convex is told as it is: soil meets its triangles. Of what stands still nothing is asked
-/// but to be drawn.
+/// A mesh that is not convex is passed on as it is: soil meets its triangles. Fixed shapes are only drawn.
 fn geometry(g: &ShapeGeometry) -> Geometry {
     match g {
         ShapeGeometry::Sphere { radius } => Geometry::Sphere { radius: *radius },

@@ -74,7 +74,7 @@ pub(crate) struct State {
     pub bodies: Vec<Motion>,
     pub joints: Vec<JointState>,
     pub closures: Vec<ClosureState>,
-    /// Rows that close loops and say nothing that the others do not say, at the last step.
+    /// Redundant rows of loops at the last step.
     pub redundant_rows: usize,
     /// External force and moment of each body.
     pub loads: Vec<Load>,
@@ -99,7 +99,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Counts work, heat, drawn energy and distance from here on. What batteries and windings hold stays.
+    /// Counts work, heat, drawn energy and distance from here on. The energy in batteries and windings stays.
     pub fn restart_ledger(&mut self) {
         let Energy { kinetic, potential, .. } = self.energy;
         self.energy = Energy { kinetic, potential, ..Energy::default() };

@@ -167,7 +167,7 @@ const CLOSURE_ITEMS: [(&str, &str, &str); 2] = [
 const CLOSURE_BROKEN: u32 = 2;
 /// Ids of the shares of divided links, by body.
 const SHARES: u32 = 1 << 25;
-/// Nearer than this an energy per metre says nothing, m.
+/// Below this distance an energy per metre is meaningless, m.
 const SHORTEST: f64 = 1e-2;
 
 /// All variables of a robot in ascending order of id.
@@ -485,7 +485,7 @@ fn motion_part(model: &Model, state: &State, body: usize, part: usize) -> [f64; 
     }
 }
 
-/// Reads numbers. Bodies that are asked for whole are read whole: a recording asks for all.
+/// Reads numbers. Bodies that are requested whole are read whole: a recording requests all.
 pub(crate) fn numbers(model: &Model, state: &State, mut ids: &[u32], mut out: &mut [f64]) -> Result {
     let all = BODY_ITEMS.len();
     while let (Some(id), false) = (ids.first(), out.is_empty()) {
@@ -642,7 +642,7 @@ pub(crate) fn break_joint(state: &mut State, joint: usize) {
     state.reactions[joint] = [0.0; 6];
 }
 
-/// Removes a connection beyond the tree for ever; what a spring holds is lost.
+/// Removes a connection beyond the tree for ever; the energy of a spring is lost.
 pub(crate) fn break_closure(state: &mut State, closure: usize) {
     let s = &mut state.closures[closure];
     state.energy.dissipated += s.stored;

@@ -57,7 +57,7 @@ fn corrections_that_diverge_are_brought_back() {
     assert!(gap < 1e-8, "{gap:e} m");
 }
 
-/// Beyond the limit of stability there is no step; the message tells the link and a step that passes.
+/// Beyond the limit of stability there is no step; the message gives the link and a step that passes.
 #[test]
 fn a_step_that_cannot_follow_a_taut_chain_says_which_one_does() {
     let mut fixture = chain("chain8_m1000", FAST, 4e-3);

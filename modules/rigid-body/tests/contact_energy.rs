@@ -9,7 +9,7 @@ const SPHERE: &str = r#"<robot name="r"><link name="s"><inertial><mass value="2"
     <inertia ixx="0.008" iyy="0.008" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"#;
 
-/// Largest deviation of the sum over a run of a thrown sphere, J, and what was lost.
+/// Largest deviation of the sum over a run of a thrown sphere, J, and the energy lost.
 fn balance(restitution: f64) -> (f64, f64) {
     let model = temporary_urdf(&format!("energy{restitution}"), SPHERE);
     let parameters = format!(

@@ -65,7 +65,7 @@ fn a_fault_puts_no_energy_in() {
         let before = fixture.balance();
         walk_in_place(&mut fixture, 1);
         let gain = fixture.balance() - before;
-        // beside what a step changes in the ledger as a rule, rounding of the energies, about 10 J
+        // besides the usual change of the ledger in a step, rounding of the energies, about 10 J
         assert!(gain <= 3.0 * usual && gain.abs() <= 3.0 * usual + 1e-8, "{fault}: {gain} {usual}");
     }
 }
@@ -177,7 +177,7 @@ fn a_restored_state_repeats_the_run_bit_by_bit() {
     fixture.robot.save_state(1).unwrap();
     let t = fixture.t;
     walk_in_place(&mut fixture, 50);
-    // as text, where what is unknown is the same as itself
+    // as text, in which an unknown energy equals itself
     let energy = |fixture: &Fixture| format!("{:?}", fixture.robot.energy());
     let first = (fixture.states(), energy(&fixture));
     fixture.robot.restore_state(1).unwrap();
@@ -198,7 +198,7 @@ fn what_cannot_be_set_is_refused() {
     assert!(fixture.robot.set(&[motor], Values::Enumeration(&[7])).is_err());
     assert!(fixture.robot.act("LF_j9.break", "{}").is_err());
     assert!(fixture.commit(&[], &[]).is_err());
-    // All or nothing, and nothing on what is gone.
+    // All or nothing, and nothing on a part that is gone.
     let before = fixture.get("LF_j1.max_torque");
     assert!(fixture.robot.set(&[bound, x], Values::F64(&[1.0, 1.0])).is_err());
     assert_eq!(fixture.get("LF_j1.max_torque"), before);

@@ -24,7 +24,7 @@ fn beside(fixture: &Fixture, body: u32) -> [f64; 3] {
     [x + 0.3, y - 0.4, z + 0.2]
 }
 
-/// Ports of six components on two bodies, half a metre beside their centres of mass.
+/// Ports of six components on two bodies, half a metre from their centres of mass.
 fn ports(fixture: &Fixture, kind: PortKind) -> [Port; 2] {
     [(3, 0), (7, 6)].map(|(body, first)| Port {
         key: u64::from(first),
@@ -94,7 +94,7 @@ fn it_is_that_of_the_trial_whatever_the_step() {
     }
 }
 
-/// Without what the factor leaves out the error is of the order of the step.
+/// Without the terms that the factor leaves out the error is of the order of the step.
 #[test]
 fn what_contacts_take_instead_is_off_by_the_order_of_the_step() {
     for integrator in INTEGRATORS {

@@ -1,4 +1,4 @@
-//! External force and moment as inputs: they turn a body as its inertia says, and their work is its energy.
+//! External force and moment as inputs: they turn a body according to its inertia, and their work is its energy.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
@@ -8,7 +8,7 @@ use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, Va
 const INTEGRATORS: [&str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
 const COM: [f64; 3] = [0.1, -0.2, 0.05];
 
-/// A free body of 2 kg with its centre of mass beside its frame, tumbling at `spin` rad/s.
+/// A free body of 2 kg with its centre of mass off its frame, tumbling at `spin` rad/s.
 fn body(name: &str, integrator: &str, spin: [f64; 3], h: f64) -> Fixture {
     let file = temporary_urdf(
         name,
@@ -57,7 +57,7 @@ fn a_tumbling_body_gains_what_force_and_moment_do() {
     assert!((1.8..2.2).contains(&(coarse / fine)), "no first order: {coarse:e} {fine:e}");
 }
 
-/// A step under a force at a port beside the centre of mass.
+/// A step under a force at a port off the centre of mass.
 fn step_by_port(fixture: &mut Fixture, origin: [f64; 3], force: [f64; 3]) {
     let port = Port {
         key: 1,

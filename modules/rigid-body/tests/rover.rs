@@ -1,5 +1,5 @@
 //! A rover whose wheels rigid motors drive, on ground that yields: landings, rates that contradict each other, motors at
-//! their bounds. No step may be lost, and the estimate of the forces stays within what the wheels can meet.
+//! their bounds. No step may be lost, and the estimate of the forces stays within the limits of the wheels.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;

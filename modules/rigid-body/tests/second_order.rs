@@ -1,4 +1,4 @@
-//! The second-order option against references of reduced coordinates, and what gluing needs of it.
+//! The second-order option against references of reduced coordinates, and its functions for gluing.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;

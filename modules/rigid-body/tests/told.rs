@@ -71,7 +71,7 @@ fn a_broken_joint_is_released_in_vain_and_cannot_be_blocked() {
     let mut fixture = Fixture::new(&text, 9.81, 1e-3);
     fixture.robot.act("k.break", "{}").unwrap();
     let blocked = fixture.id("k.blocked");
-    // A connection tells it every step.
+    // A connection sets it every step.
     fixture.robot.set(&[blocked], Values::Bool(&[false])).unwrap();
     let refused = fixture.robot.set(&[blocked], Values::Bool(&[true])).unwrap_err().to_string();
     assert!(refused.contains("broken"), "{refused}");

@@ -1,9 +1,9 @@
 //! Sensors that every robot has: IMU, range finder, joint encoder, foot force, contact switch, with their errors.
 //!
-//! [`Sensor`] is the module. What sits on a body ([`SensorKind::is_mounted`]) looks at the committed world; the others take what
-//! they measure from connections.
+//! [`Sensor`] is the module. Sensors on a body ([`SensorKind::is_mounted`]) look at the committed world; the others take their
+//! measurand from connections.
 //!
-//! # From truth to what is shown
+//! # From truth to output
 //! 1. A sample is due at each multiple of 1/`rate_hz`, at the end of each step where `rate_hz` is 0. Of several in a step the
 //!    last one is taken. A mounted sensor looks at the time of the sample itself; inputs hold over a step.
 //! 2. Each channel gets a constant bias, white noise and rounding to its quantum, in this order ([`Errors`]).

@@ -3,7 +3,7 @@
 use crate::kind::{MOST, SensorKind};
 use terraglue_subsystem::{Mount, Pose, Ray, RayHit, RayMask, Result, World, persist};
 
-/// The sensor at its last sample: an accelerometer tells the mean between two samples.
+/// The sensor at its last sample: an accelerometer reports the mean between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Before {
     pub time: f64,

@@ -89,7 +89,7 @@ impl Sensor {
         (last >= self.state.next as f64).then(|| (last as u64, (last / rate).min(end)))
     }
 
-    /// Takes a sample with its errors, and shows what is due at the end of the step.
+    /// Takes a sample with its errors, and shows the output due at the end of the step.
     fn take(&mut self, (number, time): (u64, f64), truth: &Truth) {
         let channels = self.settings.kind.channels().len();
         let mut values = truth.values;
@@ -97,7 +97,7 @@ impl Sensor {
             *value = self.errors.shown(k, number, *value);
         }
         if self.settings.kind == SensorKind::RangeFinder {
-            // what has met nothing has no errors, and no error leads out of the range
+            // a ray that met nothing has no errors, and no error leads out of the range
             let range = self.settings.range_m;
             values[0] = if truth.switch { values[0].clamp(0.0, range) } else { range };
         }
@@ -158,7 +158,7 @@ impl Subsystem for Sensor {
         Ok(())
     }
 
-    /// The ray of a range finder, as far as it tells, in the frame of its body.
+    /// The ray of a range finder, up to its reading, in the frame of its body.
     fn overlays(&self, out: &mut Vec<Overlay>) {
         let Some(mount) = self.settings.mount.as_ref() else { return };
         if self.settings.kind != SensorKind::RangeFinder {

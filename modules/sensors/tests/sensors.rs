@@ -179,7 +179,7 @@ fn an_encoder_samples_holds_and_rounds() {
         feed(encoder.as_mut(), k, 0.01 * k as f64);
         shown.push(get(encoder.as_ref(), "angle"));
     }
-    // samples at 0, 10, 20 and 30 ms, of what held in the step that ends there
+    // samples at 0, 10, 20 and 30 ms, of the input in the step that ends there
     let expected = |k: usize| [0.0, 0.0, 0.25, 0.25][(k + 1) / 10 % 4];
     assert!((0..39).all(|k| shown[k] == expected(k)), "{shown:?}");
     let mut each = sensor(r#"{"rate_hz": 0}"#);

@@ -1,4 +1,4 @@
-//! Stage 3a: arcs: pieces of a beam that may lie on a stem, each with the circle that it tells of.
+//! Stage 3a: arcs: pieces of a beam that may lie on a stem, each with the circle that fits it.
 //!
 //! A circle with radius R at the distance d takes the angle 2·asin(R/d), whatever the step of the scanner; of n firings that meet
 //! it, the mean of n·step is that angle. Its returns lie R·√(1 − u²) before its middle at the share u of its width, in the mean
@@ -75,7 +75,7 @@ impl<'a> Pieces<'a> {
         Self { returns, step, first: 0 }
     }
 
-    /// Jump of the distance between neighbours that ends a piece: what neighbours on a stem of half a metre can differ by, and noise.
+    /// Jump of the distance between neighbours that ends a piece: the largest on a stem of half a metre, and noise.
     fn jump(&self, distance: f64) -> f64 {
         4.0 * NOISE + (0.5 * self.step * distance).sqrt().min(0.5)
     }
@@ -84,7 +84,7 @@ impl<'a> Pieces<'a> {
         b.azimuth - a.azimuth > LOST * self.step || (a.distance - b.distance).abs() > self.jump(a.distance)
     }
 
-    /// Whether a neighbour beyond the end hides what could follow.
+    /// Whether a neighbour beyond the end hides a continuation.
     fn hides(&self, end: &Return, beyond: Option<&Return>) -> bool {
         beyond
             .is_some_and(|b| (b.azimuth - end.azimuth).abs() < LOST * self.step && b.distance < end.distance)

@@ -8,16 +8,16 @@ use crate::scan::{Point, Scan};
 use crate::slices;
 use crate::stems::{Revolution, Stem, StemRules, stems};
 
-/// How stems are looked for.
+/// Settings of the search for stems.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Detector {
     /// Points that are left out.
     pub filter: Filter,
-    /// What counts as a stem.
+    /// Criteria of a stem.
     pub rules: StemRules,
 }
 
-/// Points that a turn of a scanner has at most; what has more is a cloud of many turns.
+/// Points that a turn of a scanner has at most; a larger cloud holds many turns.
 const MOST_OF_A_TURN: usize = 2_000_000;
 
 /// Where a scanner stood when it made a turn, in the frame of the local map.
@@ -40,7 +40,7 @@ pub enum Nothing {
     NoGround,
     /// Nothing stands on the ground.
     NothingStands,
-    /// What stands there is not round, not upright, or rays go through.
+    /// The objects there are not round, not upright, or rays go through.
     NoStems,
 }
 

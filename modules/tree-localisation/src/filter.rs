@@ -60,7 +60,7 @@ impl Dropped {
 /// Edge of the cells that a point shares with its company: share of a turn, and distance, m.
 const CELL: [f64; 2] = [0.00625, 0.6];
 
-/// Sectors of a turn that are looked at for what hides them.
+/// Sectors of a turn that are examined for obstruction.
 const SECTORS: usize = 120;
 
 impl Filter {
@@ -90,7 +90,7 @@ impl Filter {
         (kept, dropped)
     }
 
-    /// Sectors in which the machine itself hides what is behind: azimuths from and to, rad, −π … π, in steps of 3°. A sector
+    /// Sectors in which the machine itself hides the view: azimuths from and to, rad, −π … π, in steps of 3°. A sector
     /// counts as hidden where a third or more of the returns around the horizon (10° down to 10° up) are its own.
     pub fn hidden(&self, scan: &Scan) -> Vec<[f64; 2]> {
         let eye = scan.eye.unwrap_or([0.0; 3]);
@@ -147,7 +147,7 @@ fn drop_sparse(points: &mut Vec<Point>, eye: [f64; 3]) {
     });
 }
 
-/// A number that grows from 0 to 1 with the azimuth, by the edge of a square instead of a circle: enough to tell cells apart.
+/// A number that grows from 0 to 1 with the azimuth, by the edge of a square, not a circle: enough to distinguish cells.
 fn turn(x: f64, y: f64) -> f64 {
     let sum = x.abs() + y.abs();
     let quarter = if sum > 0.0 { 0.25 * x / sum } else { 0.0 };

@@ -27,7 +27,7 @@ struct Sample {
 const CELL: f64 = 1.0;
 /// Distance of the nodes, m.
 const NODE: f64 = 3.0;
-/// Steepest ground, m/m, and what a lowest point may lie above it, m.
+/// Steepest ground, m/m, and height that a lowest point may have above it, m.
 const STEEPEST: f64 = 0.6;
 const ABOVE: f64 = 0.2;
 /// Cells around one whose lowest points can refute it.
@@ -179,7 +179,7 @@ fn plane(samples: &[Sample], at: [f64; 2], reach: f64) -> f64 {
             left += weight * row * row.transpose();
             right += weight * row * s.z;
         }
-        // level where the samples say nothing of a slope
+        // level where the samples do not determine a slope
         let flat = 1e-3 * left[(0, 0)] * reach * reach;
         left[(1, 1)] += flat;
         left[(2, 2)] += flat;

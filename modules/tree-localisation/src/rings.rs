@@ -37,7 +37,7 @@ const SAME: f64 = 1e-3;
 const STEPS: [f64; 2] = [2e-4, 0.05];
 
 impl Rings {
-    /// Sorts the points that a scanner at `eye` saw. None: nobody can tell beams apart.
+    /// Sorts the points that a scanner at `eye` saw. None: the beams cannot be distinguished.
     pub fn of(points: &[Point], eye: [f64; 3]) -> Option<Self> {
         let seen = |p: &Point| {
             let [x, y, z] = [0, 1, 2].map(|k| p.position[k] - eye[k]);
@@ -95,7 +95,7 @@ fn by_elevation(returns: &[Return]) -> Option<Vec<u16>> {
         numbers[k as usize] = number as u16;
         before = elevation;
     }
-    // what has no gaps is no turn of a few beams
+    // a cloud without gaps is no turn of a few beams
     (number > 0).then_some(numbers)
 }
 

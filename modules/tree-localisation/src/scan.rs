@@ -1,8 +1,8 @@
 //! Points of a scan, in a frame whose z is up.
 
-/// [`Point::ring`] of a point whose beam nobody knows.
+/// [`Point::ring`] of a point of an unknown beam.
 pub const NO_RING: u16 = u16::MAX;
-/// [`Point::body`] of a point of which nobody knows what it lies on.
+/// [`Point::body`] of a point on an unknown body.
 pub const NO_BODY: u32 = u32::MAX;
 
 /// A point.
@@ -33,7 +33,7 @@ impl Point {
 pub struct Scan {
     /// The points.
     pub points: Vec<Point>,
-    /// Where the scanner stood, m; none: points of several places, or of one that nobody knows.
+    /// Where the scanner stood, m; none: points of several places, or of an unknown one.
     pub eye: Option<[f64; 3]>,
 }
 

@@ -101,7 +101,7 @@ fn join(parents: &mut [u32], a: u32, b: u32) {
     parents[high as usize] = low;
 }
 
-/// A circle with what supports it.
+/// A circle with its support.
 struct Circle {
     x: f64,
     y: f64,

@@ -28,7 +28,7 @@ pub struct Stem {
     pub share: f64,
 }
 
-/// A turn as stems are looked for: its rings, where its scanner stood and how it was turned.
+/// A turn in the search for stems: its rings, where its scanner stood and how it was turned.
 #[derive(Clone, Debug)]
 pub struct Revolution {
     /// Its points, beam by beam.
@@ -39,10 +39,10 @@ pub struct Revolution {
     pub yaw: f64,
 }
 
-/// What counts as a stem.
+/// Criteria of a stem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StemRules {
-    /// Heights above the ground that are looked at, m.
+    /// Heights above the ground that are searched, m.
     pub heights_m: [f64; 2],
     /// Fewest beams.
     pub fewest: u32,
@@ -65,7 +65,7 @@ const LEAN: f64 = 0.03;
 /// Share of its diameter at breast height that a stem loses with each metre: the mean taper of the lower third of stems.
 const TAPER: f64 = 0.03;
 
-/// The stems that arcs tell of, thickest evidence first; `arcs` are in the frame of the map.
+/// The stems that arcs indicate, strongest evidence first; `arcs` are in the frame of the map.
 pub(crate) fn stems(arcs: &[Arc], turns: &[Revolution], rules: &StemRules) -> Vec<Stem> {
     let [low, high] = rules.heights_m;
     let used: Vec<Arc> = arcs.iter().filter(|a| (low..high).contains(&a.height)).copied().collect();
@@ -172,7 +172,7 @@ impl Axis {
         self.at + (z - self.z) * self.lean
     }
 
-    /// Least squares through arcs, with a lean that is small unless they say otherwise.
+    /// Least squares through arcs, with a lean that is small unless they show otherwise.
     fn fit(arcs: &[&Arc], breast: f64) -> Self {
         let z = arcs.iter().map(|a| a.centre[2]).sum::<f64>() / arcs.len() as f64;
         let (mut left, mut right) = (Matrix2::zeros(), [Vector2::zeros(); 2]);

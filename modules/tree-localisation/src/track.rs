@@ -1,4 +1,4 @@
-//! Stage 7: the pose over time from odometry, GNSS and matches, with what it may be wrong by.
+//! Stage 7: the pose over time from odometry, GNSS and matches, with its uncertainty.
 //!
 //! Trees that were seen on the way are kept in the frame of the odometry, so the map that is matched grows while the machine drives.
 //! Matches share the errors of the map and of trees that are seen again, so they are no independent measurements: the filter joins
@@ -34,7 +34,7 @@ impl Default for TrackRules {
     }
 }
 
-/// What is known of the pose.
+/// Estimate of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// The pose in the global map.
@@ -45,7 +45,7 @@ pub struct Estimate {
     pub bound: f64,
 }
 
-/// What a scan did to the estimate.
+/// Effect of a scan on the estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fix {
     /// It was matched and agrees with the estimate, or is the first one.
@@ -75,7 +75,7 @@ pub struct Tracker {
     state: TrackState,
 }
 
-/// What a tracker knows, apart from the map.
+/// State of a tracker, apart from the map.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct TrackState {
     estimate: Option<Estimate>,
@@ -123,12 +123,12 @@ impl Tracker {
         Self { matcher: matcher.into(), rules, state: TrackState::default() }
     }
 
-    /// What it knows.
+    /// Its state.
     pub fn state(&self) -> &TrackState {
         &self.state
     }
 
-    /// The same with what was known before.
+    /// The same with an earlier state.
     pub fn with_state(self, state: TrackState) -> Self {
         Self { state, ..self }
     }
@@ -138,7 +138,7 @@ impl Tracker {
         self.state.estimate.as_ref()
     }
 
-    /// What matches the local map with the global one.
+    /// The matcher of the local map with the global one.
     pub fn matcher(&self) -> &Matcher {
         &self.matcher
     }
@@ -178,8 +178,8 @@ impl Tracker {
         }
     }
 
-    /// GNSS shows a place, with its deviation under this canopy, m. It only says where to search: its errors stay the same for
-    /// minutes, so it corrects nothing.
+    /// GNSS shows a place, with its deviation under this canopy, m. It only determines where to search: its errors stay the
+    /// same for minutes, so it corrects nothing.
     pub fn gnss(&mut self, place: [f64; 2], deviation: f64) {
         let is_some = place.iter().chain([&deviation]).all(|x| x.is_finite()) && deviation > 0.0;
         self.state.gnss = is_some.then_some((place, deviation));

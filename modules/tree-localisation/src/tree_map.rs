@@ -1,4 +1,4 @@
-//! The global map: where all trees stand that somebody surveyed, read from a table, with what finds those around a place.
+//! The global map: the places of all surveyed trees, read from a table, with an index that finds those around a place.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ pub struct MapTree {
 /// Why a map cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MapError {
-    /// A line of the table says something else than numbers: its number, the column, the text.
+    /// A line of the table contains something other than numbers: its number, the column, the text.
     Text {
         /// Line, from 1.
         line: usize,
@@ -30,7 +30,7 @@ pub enum MapError {
         /// Names that are there.
         found: String,
     },
-    /// Fewer trees than a place can be told from.
+    /// Fewer trees than can identify a place.
     TooFew {
         /// Trees.
         trees: usize,

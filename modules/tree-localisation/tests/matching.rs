@@ -1,4 +1,4 @@
-//! Matching with a global map, kidnapped and with a prior, against the truth of grown stands; and what no pose may change.
+//! Matching with a global map, kidnapped and with a prior, against the truth of grown stands; and invariants of all poses.
 
 use forest_scenes::{TrialKind, TrialRow, best, local, map, stand_of};
 use proptest::prelude::*;
@@ -69,7 +69,7 @@ fn too_few_trees_have_a_reason_and_numbers_that_are_none_are_left_out() {
     };
     assert_eq!(matcher.find(&[none; 20], None), Answer::Lost(Reason::TooFewTrees { seen: 0 }));
     assert_eq!(matcher.find(&[], None), Answer::Lost(Reason::TooFewTrees { seen: 0 }));
-    // the same tree again and again tells no place
+    // the same tree again and again identifies no place
     let one = LocalTree { place: [1.0, 2.0], ..none };
     assert!(!matches!(matcher.find(&[one; 20], None), Answer::Located(_)));
 }

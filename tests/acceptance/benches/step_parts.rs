@@ -16,7 +16,7 @@ fn main() {
     }
 }
 
-/// Parts without recording, and what the whole costs with and without.
+/// Parts without recording, and the cost of the whole with and without.
 fn show(scenario: &'static str, seconds: f64) {
     let measured = |recorded: bool| -> Vec<Vec<Row>> {
         let of = |(soil, strategy)| {

@@ -1,7 +1,7 @@
-//! What a step of a shipped scenario costs: by part, and as a whole with and without recording.
+//! Cost of a step of the shipped scenarios: by part, and as a whole with and without recording.
 //!
-//! Runs are equal from the first to the last bit, so every step counts with the least of its times over several runs: what
-//! else the machine does in between is left out. Parts are told by the clock of the wall, the whole by that of the thread.
+//! Runs are equal from the first to the last bit, so every step counts with the least of its times over several runs:
+//! other work of the machine is left out. Parts are measured in wall time, the whole in CPU time of the thread.
 
 use crate::{build, shipped};
 use terraglue::observer::Observer;

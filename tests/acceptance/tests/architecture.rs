@@ -1,5 +1,5 @@
-//! Holds `docs/architecture.md` true: the arrows between crates, where unsafe code may stand, what numeric crates
-//! may not touch, and that every file says what it is.
+//! Holds `docs/architecture.md` true: the arrows between crates, places of unsafe code, limits of numeric crates, and a
+//! header in every file.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

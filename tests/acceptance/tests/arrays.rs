@@ -6,7 +6,7 @@ use terraglue_acceptance::{build, read, scenario, steps};
 /// Joint whose angle is connected.
 const JOINT: &str = "shoulder";
 
-/// A double pendulum with motors, and two times two feet that go where they are told.
+/// A double pendulum with motors, and two times two feet that follow given positions.
 const SCENARIO: &str = r#"
 [time]
 step_s = 0.001

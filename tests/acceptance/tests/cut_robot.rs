@@ -99,7 +99,7 @@ fn one_unchecked_newton_step_holds_the_elbow_for_ten_seconds() {
     }
 }
 
-/// A rod of the double pendulum as a robot of its own; `joint`: what hangs it up.
+/// A rod of the double pendulum as a robot of its own; `joint`: its suspension.
 fn rod(name: &str, joint: &str) -> String {
     let text = format!(
         "<robot name=\"{name}\">{joint}<link name=\"{name}\"><inertial><origin xyz=\"0 0 -0.5\"/><mass value=\"1.0\"/>\

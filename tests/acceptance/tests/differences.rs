@@ -19,7 +19,7 @@ thread_local! {
     static BATCHES: Cell<(u32, u32)> = const { Cell::new((0, 0)) };
 }
 
-/// A module that does not tell its derivatives.
+/// A module that does not provide its derivatives.
 struct Mute<M>(PhantomData<M>);
 
 struct MuteSubsystem(Box<dyn Subsystem>);

@@ -8,7 +8,7 @@ use terraglue_acceptance::{ROOT, build, read, steps};
 /// Steps before the fault.
 const BEFORE: usize = 20;
 
-/// A double pendulum whose motors lift it; `operator` is another one, whose variables are what a program would send.
+/// A double pendulum whose motors lift it; `operator` is another one, whose variables stand for commands.
 const SCENARIO: &str = r#"
 [time]
 step_s = 0.001

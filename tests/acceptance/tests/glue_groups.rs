@@ -1,4 +1,4 @@
-//! Several groups of glued subsystems in one scenario, snapshots of what strategies remember, and steps set by the
+//! Several groups of glued subsystems in one scenario, snapshots of the memory of strategies, and steps set by the
 //! energy residual of the interface.
 
 use terraglue::Testbed;

@@ -1,4 +1,4 @@
-//! Every option of `[gluing]` changes what it says and nothing else: Jacobians, levels, friction, soil columns.
+//! Every option of `[gluing]` has its documented effect and no other: Jacobians, levels, friction, soil columns.
 //!
 //! Models, integrators and figures: `tests/reference/gluing/README.md`.
 
@@ -10,7 +10,7 @@ fn build(text: &str) -> Testbed {
     glued(text).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// What a run did: mean evaluations of the bodies, Jacobian refreshes, evaluations for them, largest gap.
+/// Figures of a run: mean evaluations of the bodies, Jacobian refreshes, evaluations for them, largest gap.
 #[derive(Debug, Default)]
 struct Did {
     steps: f64,
@@ -87,7 +87,7 @@ fn a_frozen_jacobian_fails_when_the_rods_have_turned() {
     let failed = run(&mut frozen, 1.0).expect_err("a frozen Jacobian glues nothing that turns");
     println!("{failed}");
     assert!(failed.to_string().contains("the step was halved 4 times"), "{failed}");
-    // a clean stop: the last committed state stands, and the report says what was tried in vain
+    // a clean stop: the last committed state stands, and the report names the strategies that failed
     let (t, angle) = (frozen.t_s(), read(&frozen, "lower.b0.angle"));
     assert!(t > 0.0 && t < 1.0 && angle.is_finite());
     assert!(!frozen.report().converged && frozen.report().evaluations_bodies > 5 * 20);
@@ -111,7 +111,7 @@ fn velocity_level_keeps_the_order_and_stabilisation_the_gap() {
         "velocity level: {free:.1e} rad, gap {drift:.1e}, {later:.1e} m; stabilised {held:.1e} rad, gap {kept:.1e}, {still:.1e} m"
     );
     assert!(free < 2e-3 && held < 2e-3, "{free} {held}");
-    // what every step leaves adds up without stabilisation; with a share of 0.2 that of the last five steps remains
+    // residuals of the steps add up without stabilisation; with a share of 0.2 that of the last five steps remains
     assert!(later > 1.5 * drift && kept < 0.35 * drift && still < 0.35 * later, "{later} {kept} {still}");
 }
 

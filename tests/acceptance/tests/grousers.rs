@@ -16,7 +16,7 @@ fn rig(soil: &str, threads: usize) -> Testbed {
     Testbed::build_with(&shipped("wheel_rig", &sets), &options, &library).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Bits of what the soil and the bench tell after each 50 ms.
+/// Bits of the outputs of soil and bench after each 50 ms.
 fn way(soil: &str, threads: usize) -> Vec<u64> {
     let mut testbed = rig(soil, threads);
     let mut all = Vec::new();

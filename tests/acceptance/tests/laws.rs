@@ -1,5 +1,5 @@
 //! One law five times – built in, as text, as a module in Rust, in C and in Python – below plates and below the walking robot; and
-//! what a law may do beyond that: keep a state, ask for shorter steps.
+//! further features of a law: a state, shorter steps.
 
 use std::path::Path;
 use std::process::Command;
@@ -34,7 +34,7 @@ fn read(testbed: &Testbed, name: &str) -> f64 {
     testbed.read(name).unwrap_or_else(|| panic!("no variable {name}"))
 }
 
-/// The names of the other ways, with what they set in the scenario.
+/// The names of the other ways, with their settings in the scenario.
 fn ways(c: &str) -> [(&'static str, Vec<(&'static str, String)>); 4] {
     let text = |key, text: &str| (key, text.to_owned());
     [

@@ -1,5 +1,5 @@
 //! Once the ports are known no step allocates, on soil or on rigid ground, in the coordinator or in any module, whatever
-//! the strategy. A step that is repeated with half the length says why, in words, and is left aside.
+//! the strategy. A step that is repeated with half the length logs the reason, and is left aside.
 //!
 //! The modules are linked in, so that one counting allocator sees all of them. Recording is left aside.
 #![allow(unsafe_code)] // a global allocator is unsafe by its nature; this one only counts

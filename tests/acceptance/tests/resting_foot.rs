@@ -70,7 +70,7 @@ duration_s = 0.1
         let mut testbed = build(&scenario(&text)).unwrap_or_else(|e| panic!("{e}"));
         let mut told = || {
             steps(&mut testbed, 150);
-            // what drives it bears whatever the soil gives
+            // its drive carries any reaction of the soil
             let gap = testbed.report().max_action_reaction_gap_n;
             assert!(gap <= 1e-6, "{strategy}: action and reaction differ by {gap:e} N");
             testbed.read("feet.force[1,3]").expect("a force")

@@ -1,4 +1,4 @@
-//! Determinism: the same input gives the same bytes, whatever runs beside it and with any number of threads.
+//! Determinism: the same input gives the same bytes, whatever runs in parallel and with any number of threads.
 
 use std::path::Path;
 use terraglue::Testbed;

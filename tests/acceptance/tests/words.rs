@@ -1,5 +1,5 @@
-//! The words of the project: names that are gone stay gone, a few words are wrong everywhere, and what the code calls by a word of
-//! its own stands in `docs/glossary.md`.
+//! The words of the project: names that are gone stay gone, a few words are wrong everywhere, and terms of the code's own are in
+//! `docs/glossary.md`.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -93,7 +93,7 @@ fn texts() -> Vec<(String, String)> {
     all
 }
 
-/// Whole words: what stands between anything that is neither a letter, a digit nor an underscore.
+/// Whole words: runs of letters, digits and underscores.
 fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty())
 }

@@ -8,17 +8,17 @@ use terraglue_tree_localisation::{Fix, MapError, MatchModel, Matcher, Pose2, Tra
 /// A drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive {
-    /// Errors of the map, and what each scan shows.
+    /// Errors of the map, and trees of each scan.
     pub kind: TrialKind,
     /// Way, m.
     pub way: f64,
-    /// Largest constant error of GNSS along each axis, m; its deviation is told as 0.7 of it.
+    /// Largest constant error of GNSS along each axis, m; its stated deviation is 0.7 of it.
     pub gnss_m: f64,
     /// After how many scans the machine is carried off without noticing, and how far, m.
     pub kidnapped: Option<(u64, f64)>,
 }
 
-/// What became of a drive.
+/// Result of a drive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Driven {
     /// Error and bound after each scan for which there was an estimate, m.
@@ -40,7 +40,7 @@ impl Drive {
     /// Drives with the errors of a seed.
     ///
     /// # Errors
-    /// What the map refuses.
+    /// A map that is refused.
     pub fn run(&self, seed: u64) -> Result<Driven, MapError> {
         let (_, stand) = stand_of(1500, 7);
         let mut random = Random::new(seed);

@@ -1,4 +1,4 @@
-//! Stands of trees as worlds, and scans of them with the truth behind every point: what tests and figures of the forest begin with.
+//! Stands of trees as worlds, and scans of them with the truth behind every point, for tests and figures of the forest.
 
 mod drive;
 mod machine;
@@ -56,7 +56,7 @@ impl Forest {
     /// Grows a stand.
     ///
     /// # Errors
-    /// What the world refuses; it refuses nothing that grows.
+    /// A world that is refused; none that grows is.
     pub fn grow(growth: Growth, seed: u64) -> Result<Self> {
         Self::of(growth, Stand::grow(&growth, seed), seed)
     }
@@ -64,7 +64,7 @@ impl Forest {
     /// A stand on the ground of a growth, alone.
     ///
     /// # Errors
-    /// What the world refuses.
+    /// A world that is refused.
     pub fn of(growth: Growth, stand: Stand, seed: u64) -> Result<Self> {
         Self::around(growth, stand, seed, &Machine::default())
     }
@@ -72,7 +72,7 @@ impl Forest {
     /// A stand on the ground of a growth, around a machine at the origin.
     ///
     /// # Errors
-    /// What the world refuses.
+    /// A world that is refused.
     pub fn around(growth: Growth, stand: Stand, seed: u64, machine: &Machine) -> Result<Self> {
         let plants = plants(&stand, seed);
         let mut builder = WorldBuilder::new();
@@ -140,8 +140,8 @@ impl Forest {
         self.growth.terrain.height(at) + above
     }
 
-    /// Trees with at least so many points of their stems up to 6 m above the scanner, within a distance of the scanner: what a scan shows.
-    /// Each is its number, and its place in the frame of the scanner.
+    /// Trees with at least so many points of their stems up to 6 m above the scanner, within a distance of the scanner: the trees of a
+    /// scan. Each is its number, and its place in the frame of the scanner.
     pub fn visible(
         &self,
         seen: &[Seen],

@@ -26,7 +26,7 @@ pub struct Score {
     pub recalled: usize,
     /// Sum of squared distances of stems from trees, m².
     square: f64,
-    /// Stems whose diameter is known to 10 cm, and the sum of what they are thicker than the trees, m.
+    /// Stems whose diameter is known to 10 cm, and the sum of their excess over the trees, m.
     known: usize,
     thicker: f64,
 }

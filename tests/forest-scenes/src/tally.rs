@@ -8,7 +8,7 @@ use terraglue_tree_localisation::{
 /// The map of a trial.
 ///
 /// # Errors
-/// What the map refuses; it refuses nothing that is drawn.
+/// A map that is refused; none that is drawn is.
 pub fn map(trial: &Trial) -> Result<TreeMap, MapError> {
     TreeMap::new(
         trial.map.iter().map(|(place, diameter)| MapTree { place: *place, diameter: *diameter }).collect(),
@@ -68,7 +68,7 @@ pub fn best(answer: &Answer) -> Option<(&Found, bool)> {
 /// A row of trials: a kind in stands of so many trees.
 #[derive(Clone, Copy, Debug)]
 pub struct TrialRow {
-    /// Errors of the map, and what is seen.
+    /// Errors of the map, and the trees that are seen.
     pub kind: TrialKind,
     /// Trees of the stand.
     pub trees: usize,
@@ -81,7 +81,7 @@ pub struct TrialRow {
 }
 
 impl TrialRow {
-    /// The errors of the map as the matcher is told them.
+    /// The errors of the map as passed to the matcher.
     pub fn model(&self) -> MatchModel {
         let survey = self.kind.survey;
         let (noise_m, matched) = (survey.noise_m.max(0.05), (1.0 - survey.missing) * 0.95);
@@ -98,7 +98,7 @@ impl TrialRow {
     /// Makes the trials; `found` takes each one with its answer.
     ///
     /// # Errors
-    /// What a map refuses.
+    /// A map that is refused.
     pub fn run(
         &self,
         mut found: impl FnMut(&Trial, &Matcher, Option<&Prior>, &Answer),

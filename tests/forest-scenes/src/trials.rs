@@ -1,4 +1,4 @@
-//! Trials of matching: a map of a stand with errors, and the trees that somebody sees from a place in it.
+//! Trials of matching: a map of a stand with errors, and the trees visible from a place in it.
 
 use terraglue_forest::{Growth, Stand, Survey};
 use terraglue_numerics::random::Random;
@@ -8,7 +8,7 @@ use terraglue_numerics::random::Random;
 pub struct TrialKind {
     /// Errors of the map.
     pub survey: Survey,
-    /// Whether the map tells diameters, with this deviation, m.
+    /// Whether the map has diameters, with this deviation, m.
     pub diameter_m: Option<f64>,
     /// Trees that are seen: so many of the nearest ones, one of ten of them missed.
     pub seen: usize,
@@ -16,7 +16,7 @@ pub struct TrialKind {
     pub local_m: f64,
 }
 
-/// A trial: the truth and what there is to find it.
+/// A trial: the truth and the data to find it.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Places and diameters of the map.

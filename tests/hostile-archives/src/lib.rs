@@ -17,10 +17,10 @@ pub use refused::refused;
 pub use unloadable::{another_token, unloadable};
 pub use usable::{MANY, usable};
 
-/// An archive, and what must be said of it.
+/// An archive, and the expected error.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What is odd in it.
+    /// Its fault.
     pub name: String,
     /// The archive.
     pub bytes: Vec<u8>,

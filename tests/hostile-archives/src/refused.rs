@@ -155,7 +155,7 @@ fn descriptions() -> impl Iterator<Item = (String, String, &'static str)> {
     changes.chain(whole.into_iter().map(|(name, text, says)| (name.to_owned(), text, says)))
 }
 
-/// What is replaced in a good description by what, and what is said of it.
+/// Replacements in a good description, and the words of the refusal.
 fn changes() -> Vec<(&'static str, String, &'static str)> {
     let identifier = r#"modelIdentifier="m""#;
     let bad = [

@@ -38,7 +38,7 @@ pub fn unloadable(library: &[u8]) -> Vec<Case> {
     all
 }
 
-/// An FMU whose description has another token than its library knows, which only the library can tell.
+/// An FMU whose description has another token than its library knows, which only the library can detect.
 #[must_use]
 pub fn another_token(library: &[u8]) -> Case {
     let text = TWO.replacen(r#" guid="g""#, r#" guid="another""#, 1);

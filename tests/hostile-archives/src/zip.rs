@@ -1,4 +1,4 @@
-//! Writes zip archives byte by byte, so that every field can hold what it should not.
+//! Writes zip archives byte by byte, so that every field can hold a wrong value.
 
 use flate2::{Compress, Compression, Crc, FlushCompress, Status};
 
@@ -10,7 +10,7 @@ const VERSION: u16 = 20;
 /// Made on Unix: the upper half of the attributes is the mode.
 const MADE_BY: u16 = 3 << 8 | VERSION;
 
-/// An entry, with all that its headers say of it.
+/// An entry, with all fields of its headers.
 #[derive(Clone, Debug)]
 pub struct Entry {
     pub name: Vec<u8>,
@@ -111,7 +111,7 @@ pub fn archive(entries: &[Entry]) -> Vec<u8> {
     out
 }
 
-/// What both headers of an entry share.
+/// The common part of both headers of an entry.
 fn head(entry: &Entry, out: &mut Vec<u8>) {
     for field in [VERSION, entry.flags, entry.method, 0, 0x21] {
         out.extend(field.to_le_bytes());

@@ -112,7 +112,7 @@ static tg_status interface_jacobian(void *self, const tg_step *st, uint32_t leve
     if (BROKEN(NEGATIVE_COMPLIANCE)) for (uint32_t k = 0; k < st->n * st->n; k++) out[k] = -out[k];
     return TG_OK;
 }
-/* T*: what stops the ball at the partner at t + h. Several ports share what they hold together. */
+/* T*: the force that stops the ball at the partner at t + h. Several ports share it. */
 static tg_status estimate_forces(void *self, const tg_step *st, const tg_motion *partner, tg_estimate *out) {
     robot *r = self;
     double free_velocity[3], none[3] = { 0.0, 0.0, 0.0 };

@@ -45,7 +45,7 @@ static state shared;
 static _Thread_local uint32_t calls_of_thread;
 static state *state_of(soil *s) { return BROKEN(SHARED_STATE) ? &shared : &s->now; }
 
-/* ---- what a library does to its host when it is loaded ---- */
+/* ---- harm that a library does to its host when it is loaded ---- */
 __attribute__((unused)) static void *sleeper(void *unused) { for (;;) sleep(1000); return unused; }
 __attribute__((unused)) static void on_signal(int unused) { (void)unused; }
 static void disturb(void) {

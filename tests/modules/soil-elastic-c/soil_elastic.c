@@ -15,7 +15,7 @@ TG_DESCRIBE("soil-elastic", "1.0.0", TG_IS("soil") TG_CAN("force motion derivati
 #define MAX_FEET 64
 
 typedef struct { uint64_t key; double tangential[3]; } foot; /* committed friction on the body, world, N */
-typedef struct { /* what a port answered in the last trial; x, t along n, t1, t2 */
+typedef struct { /* answer of a port in the last trial; x, t along n, t1, t2 */
     double x[3], t[3], trial; /* trial: size of the elastic friction where the foot slides, else 0, N */
     bool force, motion;
 } answer;

@@ -6,7 +6,7 @@ use terraglue_world::{Parallel, Result, WorldBuilder, WorldModel};
 /// A drawn world whose subsystems are added in an order, at the end of its step; the ground belongs to the first piece.
 ///
 /// # Errors
-/// What the world refuses; it refuses nothing that is drawn.
+/// A world that is refused; none that is drawn is.
 pub fn drawn(
     pieces: &[Piece],
     heights: &Heights,

@@ -1,5 +1,5 @@
-//! Worlds and rays drawn at random, and what a ray meets, found by looking at every shape: what tests and figures hold the
-//! fast answers of `terraglue-world` against.
+//! Worlds and rays drawn at random, and the hits of rays, found by looking at every shape: the reference for the fast
+//! answers of `terraglue-world` in tests and figures.
 //!
 //! Nothing here shares a formula with the crate that it judges. A shape with a closed form is convex, so how far a point of a
 //! ray is outside it falls and then rises along the ray: a search by thirds finds the deepest point, bisection where the

@@ -1,10 +1,10 @@
-//! What a ray meets, by looking at every shape.
+//! Hits of a ray, by looking at every shape.
 
 use crate::draw::Piece;
 use terraglue_numerics::rotation::{Vector, conjugate, cross, dot, length, minus, plus, turned};
 use terraglue_subsystem::{GROUND, Geometry, Pose, Ray, RayHit, SceneShape, ShapeRef};
 
-/// Of a ray that gets no deeper into a shape than this, or passes it no farther away, m, nobody can say whether it meets it.
+/// A ray that gets no deeper into a shape than this, or passes it no farther away, m, grazes it: hit or miss is undecided.
 const GRAZING: f64 = 1e-8;
 
 /// Heights on a lattice, x fastest; the cells between four of them are two triangles that share the diagonal from (i + 1, j) to (i, j + 1).
@@ -51,7 +51,7 @@ pub struct Candidate {
     pub shape: ShapeRef,
     /// How far away, m; ∞: it is missed.
     pub distance: f64,
-    /// How deep the ray gets into it, or how far it passes by, m: below some 1e-8 nobody can say which.
+    /// How deep the ray gets into it, or how far it passes by, m: below some 1e-8 it is undecided which.
     pub depth: f64,
 }
 
@@ -81,7 +81,7 @@ pub fn naive(pieces: &[Piece], grounds: &[(u32, &Heights)], ray: &Ray) -> Vec<Ca
     found
 }
 
-/// Whether an answer is right: the nearest distance to 1e-5 or 10 µm, and something that is there. None: nobody can say, the ray grazes
+/// Whether an answer is right: the nearest distance to 1e-5 or 10 µm, and something that is there. None: undecided, the ray grazes
 /// something.
 pub fn is_right(hit: &RayHit, candidates: &[Candidate]) -> Option<bool> {
     let nearest = candidates.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);

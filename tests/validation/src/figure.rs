@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What a figure is held against.
+/// Limit of a figure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limit {
     /// value ≤ limit.
@@ -17,7 +17,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Whether a value is within the limit; what is not a number never is.
+    /// Whether a value is within the limit; NaN never is.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Self::AtMost(limit) => value <= limit,
@@ -42,7 +42,7 @@ impl fmt::Display for Limit {
 impl FromStr for Limit {
     type Err = String;
 
-    /// Reads what is displayed.
+    /// Reads the displayed form.
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |x: &str| x.parse().map_err(|e| format!("limit `{text}`: {e}"));
         match text.split_once(' ') {
@@ -60,13 +60,13 @@ impl FromStr for Limit {
 pub struct Figure {
     /// Stable name, e.g. `walk.soil-bekker.iterative.distance`.
     pub id: String,
-    /// What was measured; none: not measured here.
+    /// Measured value; none: not measured here.
     pub value: Option<f64>,
-    /// What it is held against.
+    /// Its limit.
     pub limit: Limit,
     /// Whether it holds; none: not judged.
     pub pass: Option<bool>,
-    /// What it is, with its unit.
+    /// Its meaning, with its unit.
     pub what: String,
     /// Whether the machine and the moment change it by factors, as they do times and memory: it is not held against its stored value.
     pub noisy: bool,

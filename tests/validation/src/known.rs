@@ -41,7 +41,7 @@ impl KnownFailures {
         self.0.iter()
     }
 
-    /// What is wrong about a figure: it fails unlisted or beyond its bound, or passes although listed.
+    /// Complaint about a figure: it fails unlisted or beyond its bound, or passes although listed.
     pub fn judge(&self, figure: &Figure) -> Option<String> {
         let told = || format!("{} = {} ({})", figure.id, figure.value_text(), figure.limit);
         match (figure.pass, self.0.get(&figure.id)) {

@@ -2,7 +2,7 @@
 //!
 //! One line per figure, tab-separated: `id value limit pass|fail|info|skip what`; `info` has no limit or is not judged. A failure that
 //! `tests/known-failures.tsv` (id, figure reached, limit, bound, reason) lists is tolerated up to its bound; a listed one that passes is
-//! not. What has become thirty times worse than `tests/figures.tsv` fails within its limit. Figures that a clock measures are judged
+//! not. A value thirty times worse than in `tests/figures.tsv` fails within its limit. Figures that a clock measures are judged
 //! under `--timing` only. The full table of a run is in `target/validation.md`.
 
 mod documents;
@@ -38,7 +38,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use stored::StoredFigures;
 
-/// What to validate.
+/// Areas and options of a validation.
 #[derive(clap::Args, Debug, Clone, Default)]
 pub struct Arguments {
     /// One area only.
@@ -79,7 +79,7 @@ impl Arguments {
     }
 }
 
-/// What an area needs to measure its figures.
+/// Settings with which an area measures its figures.
 pub struct Context {
     /// The program to run.
     pub program: PathBuf,
@@ -96,7 +96,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// What measures with the program of a profile; clocks are read in the release profile only.
+    /// A context with the program of a profile; clocks are read in the release profile only.
     fn new(profile: &str) -> Self {
         let scratch = process::target().join("validate");
         let _ = std::fs::remove_dir_all(&scratch);
@@ -105,7 +105,7 @@ impl Context {
     }
 }
 
-/// A part of an area: its name, and what measures it.
+/// A part of an area: its name, and the function that measures it.
 type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
 /// Areas with their parts, in the order of the tables.
@@ -166,7 +166,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
 }
 
-/// Measures and prints the figures of an area; writes or checks what is kept of them. `complaints` takes what is wrong with them.
+/// Measures and prints the figures of an area; writes or checks their stored values. `complaints` collects their faults.
 fn judged(
     area: &str,
     parts: &[Part],
@@ -196,7 +196,7 @@ fn judged(
     Ok(figures)
 }
 
-/// The figures of the parts of an area that were asked for; each is shown as soon as it is there.
+/// The figures of the requested parts of an area; each is shown as soon as it is there.
 fn measured(
     area: &str,
     parts: &[Part],
@@ -241,7 +241,7 @@ pub fn write_pictures() -> Outcome {
     walk::write_picture(&program("debug"))
 }
 
-/// The parts to measure: all, or the one that was asked for.
+/// The parts to measure: all, or the requested one.
 fn chosen<'a>(parts: &'a [Part], wanted: Option<&str>) -> Outcome<&'a [Part]> {
     let Some(wanted) = wanted else { return Ok(parts) };
     let found = parts.iter().position(|(name, _)| *name == wanted);

@@ -1,4 +1,4 @@
-//! Independent runs side by side, with a bar over them where somebody looks.
+//! Independent runs side by side, with a progress bar on a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicUsize, Ordering};

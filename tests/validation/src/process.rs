@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::path::Path;
 pub use xtask_start::process::*;
 
-/// Runs a scenario as a user does and reads `summary.json` from standard output; `name` stands in errors.
+/// Runs a scenario as a user does and reads `summary.json` from standard output; `name` appears in errors.
 pub fn run_scenario(
     program: &Path,
     name: &str,

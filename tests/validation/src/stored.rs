@@ -20,9 +20,9 @@ fn file() -> PathBuf {
 pub struct StoredFigure {
     /// Its value; none: not measured.
     pub value: Option<f64>,
-    /// What it is held against.
+    /// Its limit.
     pub limit: Limit,
-    /// What it is, or why it was not measured.
+    /// Its meaning, or why it was not measured.
     what: String,
 }
 
@@ -45,8 +45,8 @@ impl StoredFigure {
         self.value.map_or("-".to_owned(), |x| format!("{x:e}"))
     }
 
-    /// Whether a measurement is the same, to 5 % or 1 % of the limit: the last bits differ between processors. What is measured on some
-    /// machines only (with other programs) agrees where it is not, and what changes with the moment is held against its limit alone.
+    /// Whether a measurement is the same, to 5 % or 1 % of the limit: the last bits differ between processors. Figures measured on some
+    /// machines only (with other programs) agree where they are not, and noisy ones are held against their limit alone.
     fn agrees(&self, figure: &Figure) -> bool {
         let (Some(value), Some(stored)) = (figure.value, self.value) else { return true };
         if figure.noisy {
@@ -67,7 +67,7 @@ impl StoredFigure {
 pub struct StoredFigures(BTreeMap<String, StoredFigure>);
 
 impl StoredFigures {
-    /// Reads the table: a header line, then id, value, limit and what it is.
+    /// Reads the table: a header line, then id, value, limit and meaning.
     pub fn read() -> Outcome<Self> {
         Self::parse(&read(&file())?).map_err(|e| format!("{}: {e}", file().display()))
     }
@@ -96,7 +96,7 @@ impl StoredFigures {
         )
     }
 
-    /// Figures of an area that are not stored, are stored otherwise, or are stored and nobody measures.
+    /// Figures of an area that are not stored, are stored otherwise, or are stored but not measured.
     pub fn differences(&self, area: &str, figures: &[Figure]) -> Vec<String> {
         let cure = "run `cargo xtask docs` or `cargo xtask validate AREA --quick --write-docs`";
         let differs = figures.iter().filter_map(|figure| {
@@ -113,7 +113,7 @@ impl StoredFigures {
         differs.chain(idle).collect()
     }
 
-    /// What is wrong about a figure: it is far worse than it was, or was never written. A value that is no number fails by its limit.
+    /// Complaint about a figure: it is far worse than it was, or was never written. A value that is no number fails by its limit.
     pub fn judge(&self, figure: &Figure) -> Option<String> {
         let value = kept(figure)?;
         let Some(stored) = self.0.get(&figure.id).and_then(|stored| stored.value) else {
@@ -159,10 +159,10 @@ fn kept(figure: &Figure) -> Option<f64> {
 
 /// From where on a figure counts as far worse.
 ///
-/// Where `limit` is an upper bound the stored value counts as no less than a floor. A value at round-off, a residual of 3e-16 beside a
+/// Where `limit` is an upper bound the stored value counts as no less than a floor. A value at round-off, a residual of 3e-16 under a
 /// limit of 1e-9, changes by factors with the processor and with the order of a sum. The limits of such figures are chosen by their
 /// units and scales, so a thousandth of the limit, though no more than 1e-9, is taken for the size of rounding. An exact 0 (a count, or
-/// a difference of what is equal to the bit) has no size, and there a thousandth of the limit alone is the floor.
+/// a difference of values equal to the bit) has no size, and there a thousandth of the limit alone is the floor.
 fn bound(stored: f64, limit: Limit) -> Option<f64> {
     match limit {
         Limit::AtMost(most) => {
@@ -170,7 +170,7 @@ fn bound(stored: f64, limit: Limit) -> Option<f64> {
             let floor = if stored == 0.0 { thousandth } else { thousandth.min(1e-9) };
             Some((TIMES * stored.abs().max(floor)).max(LEAST))
         }
-        // what should be large and is not positive has no factor
+        // a value that should be large and is not positive has no factor
         Limit::AtLeast(_) => (stored > 0.0).then(|| stored / TIMES),
         Limit::Equal(_) | Limit::None => None,
     }
@@ -233,7 +233,7 @@ mod tests {
         ];
         let table = table(&stored);
         assert!(table.differences("walk", &stored[..3]).is_empty());
-        // rounding is no difference, and what is not measured here is left alone
+        // rounding is no difference, and figures not measured here are left alone
         let here = [
             Figure::new("walk.a", 2.05, Limit::AtMost(3.0), ""),
             Figure::new("walk.b", 9e-13, Limit::AtMost(1e-9), ""),

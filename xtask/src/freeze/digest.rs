@@ -2,7 +2,7 @@
 
 use terraglue::diagnostics::fingerprint;
 
-/// A hash in the making: what is to be hashed.
+/// A hash in the making: the bytes to be hashed.
 pub struct Digest(Vec<u8>);
 
 impl Digest {

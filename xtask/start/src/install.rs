@@ -7,7 +7,7 @@ use std::path::Path;
 /// The library inside exported FMUs.
 const FMU_LIBRARY: &str = "libterraglue_fmu_library.so";
 
-/// Builds in the release profile and copies what a user needs; `built`: of what is built in this profile already.
+/// Builds in the release profile and copies the files for users; `built`: an existing build in this profile.
 pub fn install(prefix: &Path, built: Option<&str>) -> Outcome {
     if built.is_none() {
         build()?;
@@ -17,7 +17,7 @@ pub fn install(prefix: &Path, built: Option<&str>) -> Outcome {
     Ok(())
 }
 
-/// Writes `target/dist/terraglue-VERSION-ARCHITECTURE.tar.gz`; `built`: of what is built in this profile already.
+/// Writes `target/dist/terraglue-VERSION-ARCHITECTURE.tar.gz`; `built`: from an existing build in this profile.
 pub fn dist(built: Option<&str>) -> Outcome {
     if built.is_none() {
         build()?;
@@ -62,13 +62,13 @@ fn build() -> Outcome {
     ]))
 }
 
-/// Copies what was built in a profile and what belongs to it.
+/// Copies the files built in a profile and those that belong to them.
 fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     let release = target().join(profile);
     copy(&release.join("terraglue"), &prefix.join("bin/terraglue"))?;
     for plugin in plugins(&root().join("modules"))? {
         let file = format!("lib{}.so", plugin.replace('-', "_"));
-        // The copy in deps is always fresh; the one beside the program is not after `cargo build -p`.
+        // The copy in deps is always fresh; the one next to the program is not after `cargo build -p`.
         let built = [release.join("deps").join(&file), release.join(&file)];
         let built = built.iter().find(|f| f.is_file()).ok_or_else(|| format!("{file} was not built"))?;
         copy(built, &prefix.join("lib/terraglue").join(&file))?;

@@ -1,5 +1,5 @@
-//! What installing needs, apart from the other developer commands: those measure and so depend on all of Terraglue, which an
-//! install would compile twice.
+//! The commands that install, apart from the other developer commands: those depend on all of Terraglue, which an install
+//! would then compile twice.
 
 mod install;
 pub mod process;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub enum Install {
     /// Build and pack program, modules, models, scenarios and docs: target/dist/terraglue-….tar.gz.
     Dist {
-        /// Pack what is built already: debug or release.
+        /// Pack an existing build: debug or release.
         #[arg(long, value_name = "PROFILE", value_parser = ["debug", "release"])]
         built: Option<String>,
     },
@@ -21,7 +21,7 @@ pub enum Install {
     Install {
         /// Where to, e.g. ~/.local.
         prefix: PathBuf,
-        /// Lay out what is built already: debug or release.
+        /// Lay out an existing build: debug or release.
         #[arg(long, value_name = "PROFILE", value_parser = ["debug", "release"])]
         built: Option<String>,
     },

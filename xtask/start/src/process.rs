@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Success, or what to tell the developer.
+/// Success, or a message for the developer.
 pub type Outcome<T = ()> = Result<T, String>;
 
 /// Root of the workspace.
@@ -34,7 +34,7 @@ pub fn cargo(arguments: &[&str]) -> Command {
     command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()), arguments)
 }
 
-/// Runs a command that must succeed, after saying what it is.
+/// Prints a command that must succeed, and runs it.
 ///
 /// # Errors
 /// The command cannot be started, or ends with another status than success.
@@ -64,7 +64,7 @@ pub fn write(path: &Path, text: &str) -> Outcome {
     made.and_then(|()| std::fs::write(path, text)).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Replaces what stands between two marks.
+/// Replaces the text between two marks.
 pub fn between(text: &str, (begin, end): (&str, &str), new: &str) -> Option<String> {
     let start = text.find(begin)? + begin.len();
     let stop = start + text[start..].find(end)?;

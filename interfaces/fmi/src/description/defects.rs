@@ -226,7 +226,7 @@ fn continuous(_: &ModelDescription, v: &Variable) -> Option<String> {
         .then(|| format!("is continuous; {:?} changes in steps only", v.value_type))
 }
 
-/// Outputs and the model structure: each output stands there once, and nothing else does.
+/// Outputs and the model structure: each output is listed once, and nothing else.
 fn structure(d: &ModelDescription) -> Vec<Defect> {
     let listed = |k: usize| d.outputs.iter().filter(|u| u.variable == k).count();
     let of = |line, message| Defect { kind: DefectKind::Structure, line, message };

@@ -80,7 +80,7 @@ fn tag_end(text: &str) -> Option<usize> {
     None
 }
 
-/// An element with the file it stands in.
+/// An element with its file.
 #[derive(Clone, Copy)]
 pub struct Element<'a> {
     pub reader: &'a Reader<'a>,

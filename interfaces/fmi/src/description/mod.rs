@@ -1,4 +1,4 @@
-//! What an FMU says of itself: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
+//! The model description of an FMU: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
 mod defects;
 pub(crate) mod element;
@@ -23,7 +23,7 @@ const NODES: u32 = 20_000_000;
 /// Reads and checks a description.
 ///
 /// # Errors
-/// The first thing that makes the FMU unusable, with line and element. What is odd but harmless is listed in
+/// The first thing that makes the FMU unusable, with line and element. Harmless oddities are listed in
 /// [`ModelDescription::problems`].
 pub fn read(path: &Path, bytes: &[u8], terminals: Option<&[u8]>) -> Result<ModelDescription> {
     let reader = Reader { path, file: "modelDescription.xml" };
@@ -104,8 +104,8 @@ fn co_simulation<'a>(root: &Element<'a>) -> Result<Element<'a>> {
     }))
 }
 
-/// The name of the library, and what is odd about it. The standards want an identifier of C, as prefix of functions in source
-/// code; a shared library has it in its file name only, so that a plain name breaks the standard and nothing else.
+/// The name of the library, and a complaint if it is odd. The standards want an identifier of C, as prefix of functions in
+/// source code; a shared library has it in its file name only, so that a plain name breaks the standard and nothing else.
 fn identifier(element: &Element) -> Result<(String, Option<String>)> {
     let text = element.required("modelIdentifier")?;
     let odd = format!("modelIdentifier = \"{}\" is no identifier of C", printable(text));

@@ -13,7 +13,7 @@ pub enum Version {
     V3,
 }
 
-/// All that an FMU says of itself.
+/// The description of an FMU.
 #[derive(Clone, Debug, Default)]
 pub struct ModelDescription {
     /// Version of the standard.
@@ -26,17 +26,17 @@ pub struct ModelDescription {
     pub description: String,
     /// Who made the model.
     pub author: String,
-    /// What made the FMU.
+    /// Tool that generated the FMU.
     pub generation_tool: String,
     /// Name of its library.
     pub identifier: String,
-    /// What it can do.
+    /// Its capabilities.
     pub capabilities: Capabilities,
     /// Whether it also is for model exchange.
     pub model_exchange: bool,
     /// Whether it also is for scheduled execution.
     pub scheduled_execution: bool,
-    /// What it wants to be run with.
+    /// Its default experiment.
     pub experiment: Experiment,
     /// Its units by name.
     pub units: Vec<(String, Unit)>,
@@ -48,13 +48,13 @@ pub struct ModelDescription {
     pub types: Vec<DeclaredType>,
     /// Variables in the order of the file, aliases of FMI 3 among them.
     pub variables: Vec<Variable>,
-    /// Positions of the outputs of the model structure, with what they depend on.
+    /// Positions of the outputs of the model structure, with their dependencies.
     pub outputs: Vec<Unknown>,
     /// Positions of the initial unknowns, likewise.
     pub initial_unknowns: Vec<Unknown>,
     /// Terminals of FMI 3.
     pub terminals: Vec<Terminal>,
-    /// What is odd but harmless.
+    /// Harmless deviations from the standard.
     pub problems: Vec<String>,
 }
 
@@ -74,7 +74,7 @@ impl ModelDescription {
     }
 }
 
-/// What an FMU can do.
+/// Capabilities of an FMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Capabilities {
     /// Its state can be saved and restored.
@@ -99,11 +99,11 @@ pub struct Capabilities {
     pub may_return_early: bool,
     /// Intermediate update (FMI 3).
     pub intermediate_update: bool,
-    /// Ends a step early where it is asked to in an intermediate update (FMI 3).
+    /// Ends a step early on request in an intermediate update (FMI 3).
     pub return_early: bool,
     /// Takes derivatives of its inputs (FMI 2).
     pub interpolates_inputs: bool,
-    /// Tells the first derivatives of its outputs.
+    /// Provides the first derivatives of its outputs.
     pub output_derivatives: bool,
 }
 
@@ -114,7 +114,7 @@ impl Capabilities {
     }
 }
 
-/// What an FMU wants to be run with.
+/// Default experiment of an FMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// s.
@@ -249,9 +249,9 @@ pub struct Variable {
     pub alias: bool,
     /// When it ticks, of an input clock whose times are known beforehand.
     pub ticks: Option<Ticks>,
-    /// When it first ticks and how it goes on, of an input clock whose intervals the FMU tells while it runs.
+    /// When it first ticks and how it goes on, of an input clock whose intervals the FMU reports while it runs.
     pub told: Option<Told>,
-    /// Whether it tells them as fractions too, of an input clock.
+    /// Whether it reports them as fractions too, of an input clock.
     pub fraction: bool,
     /// Whether it is a clock that others make tick: an output clock, or a triggered input clock.
     pub triggered: bool,
@@ -263,12 +263,12 @@ pub struct Variable {
     pub intermediate: bool,
 }
 
-/// A clock whose intervals the FMU tells.
+/// A clock whose intervals the FMU reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Told {
-    /// It first ticks here, s; each tick tells the time to the next.
+    /// It first ticks here, s; each tick reports the time to the next.
     Each(f64),
-    /// Any event may tell the time to one tick.
+    /// Any event may report the time to one tick.
     Countdown,
 }
 
@@ -322,7 +322,7 @@ impl Variable {
 pub struct Unknown {
     /// Position in [`ModelDescription::variables`].
     pub variable: usize,
-    /// Positions of what it depends on; none: of everything.
+    /// Positions of the variables that it depends on; none: all of them.
     pub dependencies: Option<Vec<usize>>,
 }
 

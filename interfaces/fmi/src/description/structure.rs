@@ -1,4 +1,4 @@
-//! The model structure: which outputs and initial unknowns there are, and what they depend on.
+//! The model structure: which outputs and initial unknowns there are, and their dependencies.
 
 use super::element::Element;
 use super::model::*;

@@ -7,7 +7,7 @@ use std::fmt::Display;
 use terraglue_subsystem::unit::Unit;
 use terraglue_subsystem::{Capabilities, Causality, Effect, Result, Subsystem, ValueType, Variable};
 
-/// Where a model comes from; what is not given is left out of the description.
+/// Where a model comes from; fields that are not given are left out of the description.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     /// Author.
@@ -18,7 +18,7 @@ pub struct Origin {
     pub date: Option<String>,
 }
 
-/// What the description says beside the variables.
+/// Attributes of the description other than the variables.
 #[derive(Clone, Debug)]
 pub struct About {
     /// Name for people.
@@ -296,7 +296,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Start values of what can be set, in the words of the standard.
+    /// Start values of variables that can be set, in the form of the standard.
     fn start(&self, entry: &Entry, v: &Variable) -> Result<Option<String>> {
         if !matches!(causality(v), "parameter" | "input") && !settable_at_start(v) {
             return Ok(None);

@@ -11,7 +11,7 @@ use terraglue_subsystem::{
     Variable, flag,
 };
 
-/// What a new instance is told.
+/// Arguments of a new instance.
 #[derive(Clone)]
 pub struct Opening {
     /// Name that the master gave it.
@@ -24,7 +24,7 @@ pub struct Opening {
 
 /// An instance at its start.
 pub struct Opened {
-    /// What is stepped.
+    /// Subsystem that is stepped.
     pub subsystem: Box<dyn Subsystem>,
     /// Value references.
     pub layout: Layout,
@@ -38,7 +38,7 @@ pub struct Opened {
     pub joints: Vec<super::JointTerminal>,
 }
 
-/// Makes the subsystem of an FMU from its resources; on failure says why.
+/// Makes the subsystem of an FMU from its resources; on failure the reason.
 pub type Open = fn(&Opening) -> Result<Opened, String>;
 
 /// Lines on their way to the master. They are handed over when a call returns, on the thread of the caller.
@@ -63,7 +63,7 @@ impl Mailbox {
     }
 }
 
-/// Where an instance stands in its life.
+/// Phase of an instance's life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Made; start values and parameters may be set.

@@ -3,7 +3,7 @@
 use crate::description::Version;
 use terraglue_subsystem::{ValueType, Variable};
 
-/// What one value reference stands for.
+/// Variable, or element of one, behind a value reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// Name in the description.
@@ -41,7 +41,7 @@ impl Layout {
         Self { version, entries }
     }
 
-    /// What a value reference stands for.
+    /// Entry of a value reference.
     pub fn entry(&self, reference: u32) -> Option<&Entry> {
         self.entries.get((reference as usize).checked_sub(1)?)
     }

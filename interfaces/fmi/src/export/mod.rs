@@ -2,7 +2,7 @@
 //!
 //! Everything here is safe Rust and knows no pointer. [`ExportedInstance`] is an instance as the standards see it: phases,
 //! value references, saved states, the log. [`describe`] writes `modelDescription.xml` from the variables, and
-//! [`pack`] the archive. The functions of the C interfaces, which wrap a [`ExportedInstance`], stand in the library that goes
+//! [`pack`] the archive. The functions of the C interfaces, which wrap an [`ExportedInstance`], are in the library that goes
 //! into the archive.
 
 mod describe;
@@ -23,7 +23,7 @@ pub use terminals::{JointTerminal, terminals};
 pub use values::FmiType;
 pub(crate) use xml::Xml;
 
-/// What a call of an FMU did not do, with the status that the standards give it.
+/// A call that an FMU refused or failed, with the status that the standards give it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wrong {
     /// Status.

@@ -5,7 +5,7 @@ use std::io::{Cursor, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 
-/// What an entry of the archive holds.
+/// Content of an entry of the archive.
 #[derive(Clone, Debug)]
 pub enum Content {
     /// Text.
@@ -28,10 +28,10 @@ pub enum Compression {
 /// Writes an archive with these entries, in their order. The same content gives the same bytes: no time is written.
 ///
 /// # Errors
-/// What cannot be read or written, with its path.
+/// A file that cannot be read or written, with its path.
 pub fn pack(path: &Path, entries: &[(String, Content)], compression: Compression) -> Result<(), String> {
     let failed = |what: &Path, e: &dyn std::fmt::Display| format!("{}: {e}", what.display());
-    // the archive is renamed into its place: what is no file there (`/dev/null`, a pipe) would be gone
+    // the archive is renamed into its place: anything there that is not a file (`/dev/null`, a pipe) would be gone
     if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
         return Err(format!(
             "{}: is no file: the archive cannot take its place; name another path",

@@ -1,12 +1,12 @@
-//! States that a master has saved: numbers of slots in the subsystem, with what the FMU itself remembers.
+//! States that a master has saved: numbers of slots in the subsystem, with the FMU's own part of the state.
 
 use super::{Answer, Phase, wrong};
 
-/// What a master holds for a saved state: never a pointer, so a stale or foreign one is found out.
+/// Handle of a saved state, held by the master: not a pointer, so a stale or foreign one is detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Handle(pub usize);
 
-/// What the FMU remembers beside the subsystem's own state.
+/// State of the FMU apart from that of its subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
     pub time: f64,
@@ -17,7 +17,7 @@ pub(super) struct Moment {
 /// All states saved by one instance.
 #[derive(Debug)]
 pub(super) struct States {
-    /// Tells the handles of instances apart.
+    /// Distinguishes the handles of instances.
     instance: usize,
     moments: Vec<Option<Moment>>,
 }
@@ -44,7 +44,7 @@ impl States {
         }
     }
 
-    /// Remembers what belongs to a slot.
+    /// Stores the moment that belongs to a slot.
     pub fn keep(&mut self, slot: u32, moment: Moment) -> Handle {
         if let Some(place) = self.moments.get_mut(slot as usize) {
             *place = Some(moment);

@@ -1,7 +1,8 @@
-//! Terminals of FMI 3.0: the variables of a body, of a joint, and those of driven feet, named as what plugs into another FMU.
+//! Terminals of FMI 3.0: the variables of a body, of a joint, and those of driven feet, as they plug into another FMU.
 //!
-//! Joints (`org.terraglue.joint`) are told by the subsystem itself, their members with the names of their variables. A group `NAME.x`, `NAME.y`, `NAME.z` is a body (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet
-//! (`org.terraglue.feet`, a row per foot). Members are matched by their names.
+//! Joints (`org.terraglue.joint`) come from the subsystem itself, with the names of their variables. A group `NAME.x`, `NAME.y`, `NAME.z` is a body
+//! (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet (`org.terraglue.feet`, a row per foot). Members are matched by their
+//! names.
 
 use super::Layout;
 use super::xml::Xml;
@@ -142,7 +143,7 @@ mod tests {
         };
         let moving = [("position", "a.leg.angle"), ("velocity", "a.leg.rate"), ("torque", "a.gone")];
         let found = all(&layout, &[joint("a.leg", &moving), joint("a.weld", &[])]);
-        // the body has the same name; what the version has no type for is left out, and so is a joint without variables
+        // the body has the same name; variables without a type in this version are left out, and joints without any
         assert_eq!(found.len(), 2);
         let members = moving[..2].iter().map(|(m, v)| (*m, (*v).to_owned())).collect();
         assert_eq!(found[1], ("a_leg_joint".to_owned(), "org.terraglue.joint", members));

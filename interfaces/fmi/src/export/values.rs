@@ -8,12 +8,12 @@ pub trait FmiType: Clone + Default {
     /// Reads a whole variable.
     ///
     /// # Errors
-    /// A variable of another type, or what the subsystem answers.
+    /// A variable of another type, or the error of the subsystem.
     fn read(subsystem: &dyn Subsystem, v: &Variable, out: &mut [Self]) -> Result;
     /// Writes a whole variable.
     ///
     /// # Errors
-    /// A variable of another type, or what the subsystem answers.
+    /// A variable of another type, or the error of the subsystem.
     fn write(subsystem: &mut dyn Subsystem, v: &Variable, values: &[Self]) -> Result;
     /// Why a value is not acceptable for any variable.
     fn objection(&self) -> Option<String> {

@@ -51,7 +51,7 @@ impl Xml {
     }
 }
 
-/// Text as it may stand in an attribute.
+/// Text escaped for an attribute.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

@@ -1,5 +1,5 @@
-//! Clocks in event mode (FMI 3.0, 2.2.9): periodic ones tick by themselves, triggered ones when they are told to, output
-//! clocks when the FMU says so. Inputs that belong to clocks wait for a tick of one of them.
+//! Clocks in event mode (FMI 3.0, 2.2.9): periodic ones tick by themselves, triggered ones on request, output clocks
+//! when the FMU reports it. Inputs that belong to clocks wait for a tick of one of them.
 
 use super::foreign::ForeignInstance;
 use super::functions::Api;
@@ -24,7 +24,7 @@ struct Clocked {
 pub struct Clocks {
     /// Input clocks that tick by themselves.
     periodic: Vec<(u32, Ticks)>,
-    /// Input clocks that tick when the FMU told.
+    /// Input clocks that tick at times reported by the FMU.
     pub(super) told: ToldClocks,
     /// Input clocks that tick when the next step begins.
     due: Vec<u32>,
@@ -35,7 +35,7 @@ pub struct Clocks {
 }
 
 impl Clocks {
-    /// The clocks that can tick. What cannot is said.
+    /// The clocks that can tick. The others are logged.
     pub(super) fn new(variables: &[Variable], event_mode: bool, log: &InstanceLog) -> Self {
         let clocks = || variables.iter().filter(|v| v.value_type == ValueType::Clock && !v.alias);
         if !event_mode {
@@ -73,7 +73,7 @@ impl Clocks {
         self.periodic.iter().any(|(_, ticks)| ticks.at(t)) || self.told.any_due(t)
     }
 
-    /// Whether a clock ticks at t because the FMU told so just now.
+    /// Whether a clock ticks at t because the FMU has just reported it.
     #[inline]
     pub(super) fn told_at(&self, t: f64) -> bool {
         self.told.any_due(t)
@@ -114,14 +114,14 @@ impl Clocks {
         self.inputs.iter().any(|i| i.reference == input)
     }
 
-    /// Keeps what sets an input until a clock of it ticks, then and at every tick after it.
+    /// Keeps the function that sets an input until a clock of it ticks, then and at every tick after it.
     pub fn hold(&mut self, input: u32, value: impl Fn(&ForeignInstance) -> Result + Send + 'static) {
         if let Some(found) = self.inputs.iter_mut().find(|i| i.reference == input) {
             found.value = Some(Box::new(value));
         }
     }
 
-    /// In event mode: activates the clocks that the FMU told to tick at once.
+    /// In event mode: activates the clocks that are to tick at once, as reported by the FMU.
     pub(super) fn tick_told(&mut self, foreign: &ForeignInstance, t: f64) -> Result {
         self.tick_without_periodic(foreign, t, false)
     }

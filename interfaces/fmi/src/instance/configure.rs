@@ -11,8 +11,8 @@ impl FmuInstance {
     /// Sets structural parameters, by name; [`FmuInstance::description`] has the new sizes of arrays afterwards.
     ///
     /// # Errors
-    /// What is no structural parameter, a value out of range, an array that would be too large – before anything is called –,
-    /// and what the FMU answers, each with the name of the parameter.
+    /// A name that is no structural parameter, a value out of range, an array that would be too large – before anything is
+    /// called –, and errors of the FMU, each with the name of the parameter.
     pub fn configure(&mut self, values: &[(&str, i128)]) -> Result {
         if values.is_empty() {
             return Ok(());
@@ -91,7 +91,7 @@ fn refused(what: &str, why: &str) -> Error {
     Error::WrongInput(format!("the structural parameters cannot be {what}: {why}"))
 }
 
-/// The error of a call with what was being set.
+/// The error of a call with the parameter that was being set.
 fn named(error: Error, what: &str) -> Error {
     match error {
         Error::Call { function, outcome, log, fatal } => {

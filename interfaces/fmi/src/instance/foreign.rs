@@ -1,4 +1,4 @@
-//! The instance on the other side of the C interface: each call of it is looked at before, and its status after.
+//! The instance on the other side of the C interface: each call is checked before, and its status after.
 
 use super::functions::{Api, Callbacks2, InstanceHandle};
 use super::log::InstanceLog;
@@ -27,7 +27,7 @@ pub enum Health {
 pub enum CallStatus {
     /// Done.
     Ok,
-    /// Done, with something to say.
+    /// Done, with a warning.
     Warning,
     /// Not done, and nothing has changed.
     Discard,
@@ -75,8 +75,8 @@ pub fn goes_on(status: CallStatus) -> bool {
     matches!(status, CallStatus::Ok | CallStatus::Warning)
 }
 
-/// The instance on the other side of the C interface, from its making to its end: whether it may be called, what it
-/// answered, and the values of its variables. What every step looks at stands first.
+/// The instance on the other side of the C interface, from its making to its end: whether it may be called, its
+/// answers, and the values of its variables. Members that every step uses come first.
 #[repr(C)]
 pub struct ForeignInstance {
     component: InstanceHandle,
@@ -144,7 +144,7 @@ impl ForeignInstance {
         }
     }
 
-    /// Tells the trace, where there is one: each call before it is made, so that the last one is known after a crash.
+    /// Traces each call, where there is a trace, before it is made, so that the last one is known after a crash.
     #[inline(always)]
     pub(super) fn trace(&self, text: fmt::Arguments) {
         if self.log.is_traced() {
@@ -178,7 +178,7 @@ impl ForeignInstance {
         done
     }
 
-    /// Calls a function and answers its status; what may not be called is an error.
+    /// Calls a function and returns its status; a function that may not be called is an error.
     #[inline(always)]
     pub(super) fn status<F>(
         &self,
@@ -249,7 +249,7 @@ impl ForeignInstance {
         error
     }
 
-    /// An error in what a function answered.
+    /// An error in the answer of a function.
     #[cold]
     pub(super) fn lied(&self, function: &'static str, outcome: String) -> Error {
         self.health.set(Health::Erroneous);
@@ -261,7 +261,7 @@ impl Drop for ForeignInstance {
     fn drop(&mut self) {
         let _mode = Keep::new();
         if self.is_dead() {
-            // Nothing of it may be called, so what it still holds must stay loaded.
+            // Nothing of it may be called, so everything that it still holds must stay loaded.
             std::mem::forget(self.loaded.clone());
             return;
         }

@@ -1,8 +1,8 @@
 //! The functions of the C interfaces, by hand from the text of the standards.
 //!
 //! Every function is optional here: a missing one is an error of the call that needs it, or at load time where the
-//! standard demands it or the description promises it. What every step calls stands first in a table, on one line of the
-//! cache: a chain of FMUs is as quick as its memory.
+//! standard demands it or the description promises it. Functions that every step calls come first in a table, on one
+//! line of the cache: a chain of FMUs is as quick as its memory.
 
 use crate::error::{Error, Result};
 use crate::fmu::Fmu;

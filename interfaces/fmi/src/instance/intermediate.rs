@@ -1,8 +1,8 @@
-//! Intermediate update (FMI 3.0, 4.2.2): an FMU shows values at its own inner steps, takes inputs there and may be asked to
-//! stop there.
+//! Intermediate update (FMI 3.0, 4.2.2): an FMU shows values at its own inner steps, takes inputs there and can be
+//! requested to stop there.
 //!
-//! An FMU calls from inside its `doStep`. What it calls at another time, from another thread, from inside another call of
-//! its own or without places for an answer is not followed and said once.
+//! An FMU calls from inside its `doStep`. A call at another time, from another thread, from inside another call of its
+//! own or without places for an answer is ignored and logged once.
 
 use super::follow::Followed;
 use super::functions::Vr;
@@ -24,31 +24,31 @@ pub struct IntermediateRow {
     pub t: f64,
     /// Whether the FMU has finished an inner step there; else it is a trial of its solver.
     pub finished: bool,
-    /// Of the variables that were asked for, arrays one after the other.
+    /// Of the requested variables, arrays one after the other.
     pub values: Vec<f64>,
 }
 
-/// What happens to calls at a wrong time.
+/// Message for calls at a wrong time.
 const UNHEARD: &str = "; that is not followed";
 
-/// What an instance's intermediate updates are answered with.
+/// State from which an instance's intermediate updates are answered.
 #[derive(Default)]
 pub struct Updates {
     inner: Mutex<Inner>,
-    /// Whether it was said that a call is odd.
+    /// Whether an odd call has been logged.
     pub(super) said: AtomicBool,
 }
 
 #[derive(Default)]
 pub(super) struct Inner {
     window: Option<Window>,
-    /// What is read.
+    /// Variables that are read.
     references: Vec<Vr>,
     names: Vec<String>,
     /// Numbers behind all references.
     count: usize,
     rows: Vec<IntermediateRow>,
-    /// What is set.
+    /// Inputs that are set.
     pub followed: Vec<Followed>,
     /// Why the step cannot stand.
     wrong: Option<StepFault>,
@@ -69,7 +69,7 @@ impl Updates {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes the call of an FMU; answers where the step shall end early, if so, or what is odd about the call.
+    /// Takes the call of an FMU; returns where the step shall end early, if so, or a complaint about the call.
     pub(super) fn take(
         &self,
         t: f64,
@@ -133,7 +133,7 @@ impl Updates {
 
 impl Inner {
     fn inside(&mut self, window: Window, t: f64, [requested, allowed, finished]: [bool; 3]) {
-        // the standard wants all that is read to be read before anything is set
+        // the standard requires all reads before anything is set
         let read = allowed && !self.references.is_empty();
         let mut done = if read { self.read(window, t, finished) } else { Ok(()) };
         if requested && done.is_ok() {
@@ -142,11 +142,11 @@ impl Inner {
         self.wrong = done.err();
     }
 
-    /// A call for a time that is none of the step; what is odd about it where the step stands all the same.
+    /// A call for a time outside the step; a complaint where the step is valid all the same.
     fn outside(&mut self, window: Window, t: f64, requested: bool) -> std::result::Result<(), String> {
         let text = format!("for t = {t} s in the step from {} s to {} s", window.start, window.end);
         let (reads, sets) = (!self.references.is_empty(), requested && !self.followed.is_empty());
-        // solvers step over the end and come back; inputs are known there, what the FMU shows is none of this step
+        // solvers step over the end and come back; inputs are known there, values of the FMU are not of this step
         if sets && !reads && t > window.end && t.is_finite() {
             self.wrong = self.set(window, t).err();
             let given = "; the standard wants times within the step, it was given the inputs of that time";

@@ -1,9 +1,9 @@
-//! Clocks whose intervals the FMU tells in event mode (FMI 3.0, 2.2.9): each tick the time to the next one (`calculated`, `tunable`,
-//! `changing`), or any event the time to a single tick (`countdown`).
+//! Clocks whose intervals the FMU reports in event mode (FMI 3.0, 2.2.9): each tick the time to the next one (`calculated`,
+//! `tunable`, `changing`), or any event the time to a single tick (`countdown`).
 //!
-//! Intervals told as fractions are added up as whole numbers, so that a clock of 1/3 s does not drift.
+//! Intervals reported as fractions are added up as whole numbers, so that a clock of 1/3 s does not drift.
 //!
-//! What was told last belongs to the state of the instance: it is saved and restored with it.
+//! The last reported intervals belong to the state of the instance: they are saved and restored with it.
 
 use super::foreign::ForeignInstance;
 use super::functions::Api;
@@ -12,7 +12,7 @@ use crate::error::Result;
 use std::cell::Cell;
 use std::ffi::c_int;
 
-/// `fmi3IntervalNotYetKnown` and `fmi3IntervalUnchanged`; what else is told is new.
+/// `fmi3IntervalNotYetKnown` and `fmi3IntervalUnchanged`; with any other qualifier the interval is new.
 const NOT_YET_KNOWN: c_int = 0;
 const UNCHANGED: c_int = 1;
 /// Numbers of a clock in a schedule.
@@ -26,7 +26,7 @@ pub struct ToldClock {
     /// Number in calls.
     pub reference: u32,
     kind: Told,
-    /// Whether it tells fractions.
+    /// Whether it reports fractions.
     fraction: bool,
     /// Time of its next tick and the interval before it, s; ∞ and 0: not known.
     next: Cell<f64>,
@@ -35,9 +35,9 @@ pub struct ToldClock {
     base: Cell<f64>,
     sum: Cell<f64>,
     resolution: Cell<f64>,
-    /// The counter that was told last.
+    /// The counter that was reported last.
     counter: Cell<f64>,
-    /// Whether it has just ticked, so that its next interval is asked for.
+    /// Whether it has just ticked, so that its next interval is read.
     ticked: Cell<bool>,
 }
 
@@ -89,7 +89,7 @@ impl ToldClock {
         due
     }
 
-    /// Takes what the FMU told at t; the reason where that is no interval.
+    /// Takes the interval that the FMU reported at t; the reason where it is not valid.
     fn tell(&self, t: f64, interval: f64, qualifier: c_int) -> std::result::Result<(), String> {
         if !self.listens(qualifier) {
             return Ok(());
@@ -227,13 +227,13 @@ impl ToldClocks {
         Ok(())
     }
 
-    /// What was told last, to be kept beside a saved state.
+    /// Appends the last reported intervals, to be kept with a saved state.
     pub fn schedule(&self, out: &mut Vec<f64>) {
         out.clear();
         out.extend(self.0.iter().flat_map(|clock| clock.numbers().map(Cell::get)));
     }
 
-    /// Back to what was told when a state was saved.
+    /// Restores the intervals that were kept with a saved state.
     pub fn reschedule(&self, schedule: &[f64]) {
         for (clock, kept) in self.0.iter().zip(schedule.chunks_exact(KEPT)) {
             clock.numbers().into_iter().zip(kept).for_each(|(own, kept)| own.set(*kept));

@@ -1,4 +1,4 @@
-//! What an FMU logs: kept for errors, handed on with a limit, because some FMUs log without end.
+//! The log of an FMU: kept for errors, handed on with a limit, because some FMUs log without end.
 
 use super::intermediate::Updates;
 use std::collections::{BTreeMap, VecDeque};
@@ -38,9 +38,9 @@ pub struct InstanceLog {
     /// Takes a line for each call of the FMU, where they are traced.
     trace: Option<Trace>,
     lines: Mutex<LogState>,
-    /// Whether anything was said since the last call began; most calls say nothing and need no lock.
+    /// Whether anything was logged since the last call began; most calls log nothing and need no lock.
     said: AtomicBool,
-    /// What intermediate updates are answered with: they come with the same environment.
+    /// State of the intermediate updates, which come with the same environment.
     pub(super) updates: Updates,
 }
 
@@ -53,7 +53,7 @@ struct LogState {
 }
 
 /// All logs of living instances by address, with the name of the instance. An FMU may hand anything to its logger, or
-/// call it after its end; only what stands here is taken for a log.
+/// call it after its end; only an address listed here is taken for a log.
 static LOGS: Mutex<BTreeMap<usize, (String, Weak<InstanceLog>)>> = Mutex::new(BTreeMap::new());
 
 fn logs() -> MutexGuard<'static, BTreeMap<usize, (String, Weak<InstanceLog>)>> {
@@ -97,7 +97,7 @@ impl InstanceLog {
         self.trace.is_some()
     }
 
-    /// Tells the trace of a call.
+    /// Writes a call to the trace.
     #[cold]
     pub fn trace(&self, text: &dyn Display) {
         if let Some(trace) = &self.trace {
@@ -126,7 +126,7 @@ impl InstanceLog {
         (self.sink)(&LogLine { level: LogLevel::Warning, text: text.to_owned() });
     }
 
-    /// What the call that failed has said.
+    /// Lines logged by the call that failed.
     pub fn last(&self) -> Vec<String> {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         lines.kept.iter().cloned().collect()
@@ -166,7 +166,7 @@ impl InstanceLog {
     }
 }
 
-/// Text of an FMU, however broken; at most some thousand bytes are looked at.
+/// Text of an FMU, however broken; at most some thousand bytes are read.
 ///
 /// # Safety
 /// `text` is null or points at bytes up to a zero.

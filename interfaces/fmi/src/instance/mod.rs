@@ -49,7 +49,7 @@ unsafe extern "C" {
     );
 }
 
-/// What an instance is made with.
+/// Options of an instance.
 ///
 /// ```
 /// use terraglue_fmi::InstanceOptions;
@@ -99,8 +99,8 @@ enum InstancePhase {
     Terminated,
 }
 
-/// An instance of an FMU: its life from the start values to its end, and its steps. What every step looks at stands first and in
-/// this order, on one line of the cache: the cost of many cheap FMUs is that of their memory.
+/// An instance of an FMU: its life from the start values to its end, and its steps. Members that every step uses come first and
+/// in this order, on one line of the cache: the cost of many cheap FMUs is that of their memory.
 #[repr(C)]
 pub struct FmuInstance {
     phase: InstancePhase,
@@ -108,21 +108,21 @@ pub struct FmuInstance {
     /// Whether the FMU may call for an intermediate update.
     updates: bool,
     foreign: ForeignInstance,
-    /// What the FMU says of itself, with the array sizes of this instance.
+    /// Description of the FMU, with the array sizes of this instance.
     description: Arc<ModelDescription>,
     clocks: Clocks,
     start: f64,
-    /// What is read in intermediate updates.
+    /// Value references that are read in intermediate updates.
     shown: Vec<u32>,
-    /// What may be read or set in intermediate updates.
+    /// Value references that may be read or set in intermediate updates.
     announced: Vec<u32>,
     /// Whether it was noted that it reports the time of its own solver.
     own_time: Cell<bool>,
     /// Whether it was noted that it returns early without the flag.
     early: Cell<bool>,
-    /// Whether it was said that it does not tell how far it came.
+    /// Whether it was noted that it does not report how far it came.
     untold: Cell<bool>,
-    /// Whether it was said that it changes the floating-point mode.
+    /// Whether it was noted that it changes the floating-point mode.
     mode_told: Cell<bool>,
     // last: the folder outlives the library
     fmu: Arc<Fmu>,
@@ -231,7 +231,7 @@ impl FmuInstance {
         self.foreign.log.note(text);
     }
 
-    /// What the FMU says of itself, with the array sizes of this instance.
+    /// Description of the FMU, with the array sizes of this instance.
     #[inline]
     pub fn description(&self) -> &Arc<ModelDescription> {
         &self.description
@@ -295,9 +295,9 @@ impl FmuInstance {
         Ok(())
     }
 
-    /// Tells what an input is at any time inside a step (FMI 3): `at` writes its elements at a time, s, and leaves NaN where
-    /// there is no number. The FMU asks for it in its intermediate update, if it does; where a step has parts – an event,
-    /// a clock, an early return – it is set between them too.
+    /// Provides the value of an input at any time inside a step (FMI 3): `at` writes its elements at a time, s, and leaves
+    /// NaN where there is no number. The FMU asks for it in its intermediate update, if it does; where a step has parts – an
+    /// event, a clock, an early return – it is set between them too.
     ///
     /// # Errors
     /// An input that was not announced ([`InstanceOptions::followed`]).
@@ -433,7 +433,7 @@ impl FmuInstance {
 impl Drop for FmuInstance {
     fn drop(&mut self) {
         if self.foreign.is_good() {
-            // The run is over; what it says to this is in its log.
+            // The run is over; its complaint is in its log.
             drop(self.terminate());
         }
     }

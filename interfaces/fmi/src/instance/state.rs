@@ -11,7 +11,7 @@ const LARGEST_STATE: usize = 4 << 30;
 #[derive(Debug)]
 pub struct FmuState {
     handle: StateHandle,
-    /// When clocks tick whose intervals the FMU tells.
+    /// Schedule of the clocks whose intervals the FMU reports.
     schedule: Vec<f64>,
 }
 
@@ -31,7 +31,7 @@ impl FmuState {
     }
 }
 
-/// Refuses what the FMU does not offer.
+/// Refuses a capability that the FMU does not offer.
 fn offered(what: bool, name: &str) -> Result {
     if what { Ok(()) } else { Err(Error::Refused(format!("the FMU does not offer {name}"))) }
 }
@@ -144,7 +144,7 @@ impl FmuInstance {
                 })?
             }
         }
-        // what belongs to the state but lies with the master goes behind it
+        // the part of the state that lies with the master goes behind it
         bytes.extend(schedule.iter().flat_map(|x| x.to_le_bytes()));
         Ok(bytes)
     }

@@ -1,4 +1,4 @@
-//! `doStep`, events between steps, and what both answer.
+//! `doStep`, events between steps, and the answers of both.
 
 use super::foreign::{CallStatus, goes_on};
 use super::functions::{Api, Three};
@@ -15,7 +15,7 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 const TERMINATED: c_int = 3;
 /// Largest time past the end of a step that an FMU without `fixedInternalStepSize` may report, as a share of the step.
 const PAST: f64 = 1e-3;
-/// What stands in `lastSuccessfulTime` before a step, a NaN of its own: does the FMU write there at all?
+/// Value of `lastSuccessfulTime` before a step: a NaN of its own shows whether the FMU writes it at all.
 const UNTOLD: f64 = f64::from_bits(0x7ff8_756e_746f_6c64);
 /// Rounds of discrete updates at one time before an FMU is taken to loop for ever.
 const ROUNDS: u32 = 1000;
@@ -46,7 +46,7 @@ pub struct Stepped {
 
 /// Where a part of a step has ended.
 enum PartEnd {
-    /// At the time that was asked for.
+    /// At the requested time.
     Stop,
     /// Before it, where the FMU goes on.
     Before,
@@ -175,7 +175,7 @@ impl FmuInstance {
         }
     }
 
-    /// One call of `fmi3DoStep`, from t to `stop`, and a look at what it answered.
+    /// One call of `fmi3DoStep`, from t to `stop`, and a check of its answer.
     #[inline]
     fn do_part(&mut self, step: Advance, (t, stop): (f64, f64), tolerance: f64) -> Result<StepPart> {
         const NAME: &str = DO_STEP_3;
@@ -227,7 +227,7 @@ impl FmuInstance {
     ///
     /// An FMU with a solver step of its own (`fixedInternalStepSize`) may report the time of its solver, which is up to one of
     /// these steps away from the communication point that it has reached: the Reference FMUs do. Any other FMU that reports an
-    /// earlier time has returned early, whether it says so or not, and is continued from there.
+    /// earlier time has returned early, whether it reports so or not, and is continued from there.
     fn part_end(&self, (t, stop): (f64, f64), last: f64, early: bool, tolerance: f64) -> PartEnd {
         let off = last - stop;
         if off.abs() <= tolerance {
@@ -278,7 +278,7 @@ impl FmuInstance {
         Ok(end)
     }
 
-    /// Between two parts of a step: sets the inputs that the FMU follows; what it asked for last may be of another time.
+    /// Between two parts of a step: sets the inputs that the FMU follows; its last request may be of another time.
     fn set_followed(&self, t: f64) -> Result {
         let mut inner = self.foreign.log.updates.inner();
         inner.followed.iter_mut().try_for_each(|input| {
@@ -322,7 +322,7 @@ impl FmuInstance {
     }
 }
 
-/// What is wrong with a step that has more parts than any can need.
+/// Complaint about a step that has more parts than any can need.
 fn endless(events: u32, returns: u32) -> Option<String> {
     if events > ROUNDS {
         return Some(format!("found more than {ROUNDS} events in one step"));
@@ -364,7 +364,7 @@ fn returned_early(instance: &FmuInstance, last: f64, stop: f64) {
     }
 }
 
-/// Where an FMU is that said its step is made and not how far it came.
+/// The time of an FMU that completed its step but did not report `lastSuccessfulTime`.
 #[cold]
 fn untold(instance: &FmuInstance, stop: f64) -> f64 {
     if !instance.untold.replace(true) {

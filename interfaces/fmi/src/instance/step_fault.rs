@@ -16,7 +16,7 @@ impl From<String> for StepFault {
 }
 
 impl StepFault {
-    /// What a status of a call inside the call-back means; `call` says which one.
+    /// Interprets the status of a call inside the call-back; `call` names the call.
     pub fn of(status: c_int, call: impl Fn() -> String) -> std::result::Result<(), Self> {
         match status {
             0 | 1 => Ok(()),

@@ -209,7 +209,7 @@ impl ForeignInstance {
                 return Err(self.lied(NAME, format!("answered {size} bytes that are not there")));
             }
             if size > 0 {
-                // SAFETY: the FMU says that so many bytes lie there until the next call.
+                // SAFETY: the FMU declares that so many bytes lie there until the next call.
                 out.extend_from_slice(unsafe { std::slice::from_raw_parts(place, size) });
             }
         }

@@ -1,4 +1,4 @@
-//! Where an element of a system structure is read: what may be named there, and what its units mean.
+//! The place where an element of a system structure is read: files that it may name, and the meaning of its units.
 
 use super::Files;
 use terraglue_subsystem::unit::Unit;
@@ -15,7 +15,7 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// What the name of a unit means: by `own` definitions, by those of the structure, or else in our reading.
+    /// The unit of a name: by `own` definitions, by those of the structure, or else in our reading.
     pub fn unit(&self, name: &str, own: &[(String, Unit)]) -> Option<Unit> {
         let defined = own.iter().chain(self.units).find(|(n, _)| n == name).map(|(_, unit)| *unit);
         defined.or_else(|| Unit::parse(name).ok().filter(|_| !name.is_empty()))

@@ -1,8 +1,8 @@
 //! System structures (SSP 1.0, Modelica Association): FMUs, how they are connected, and their parameters.
 //!
 //! [`Package::open`] reads an archive (`.ssp`) through the same checks as one of an FMU, or a description beside its
-//! files (`.ssd`). None of the code of its FMUs runs. What this reader does not know it refuses by name, such as
-//! packages inside packages.
+//! files (`.ssd`). None of the code of its FMUs runs. Features that this reader does not know are refused by name,
+//! such as packages inside packages.
 
 mod context;
 mod model;
@@ -41,7 +41,7 @@ impl Package {
     /// Checks, extracts and reads a system structure.
     ///
     /// # Errors
-    /// What is wrong with archive or description, with entry or line.
+    /// A fault of the archive or the description, with entry or line.
     pub fn open(path: &Path) -> Result<Self> {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssd")) {
             let base = match path.parent() {
@@ -65,7 +65,7 @@ impl Package {
         &self.path
     }
 
-    /// What it says.
+    /// Its system structure.
     pub fn structure(&self) -> &Structure {
         &self.structure
     }

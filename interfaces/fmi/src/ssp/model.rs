@@ -32,7 +32,7 @@ pub struct System {
     pub dictionaries: Vec<Dictionary>,
 }
 
-/// What a system consists of.
+/// An element of a system.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SystemElement {
     /// An FMU.
@@ -123,7 +123,7 @@ pub struct Transformation {
     pub offset: f64,
     /// Whether units are left alone.
     pub keeps_unit: bool,
-    /// What each value becomes, of truth values, whole numbers or items of enumerations.
+    /// New value of each truth value, whole number or item of an enumeration.
     pub table: Option<Table>,
 }
 
@@ -140,12 +140,12 @@ impl Transformation {
     }
 }
 
-/// What single values become: pairs of value and new value, each value once.
+/// A mapping of single values: pairs of value and new value, each value once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table(pub Vec<(Value, Value)>);
 
 impl Table {
-    /// What a value becomes; nothing where the table does not have it.
+    /// The new value of a value; none where the table does not have it.
     pub fn of(&self, value: &Value) -> Option<&Value> {
         self.0.iter().find(|(source, _)| source == value).map(|(_, target)| target)
     }

@@ -45,7 +45,7 @@ impl Placed {
     }
 }
 
-/// The part of a line that lies inside what was intersected so far.
+/// The part of a line inside the intersection so far.
 #[derive(Clone, Copy)]
 struct Interval {
     low: f64,

@@ -1,6 +1,6 @@
 //! The underside of a mesh that is not convex: the lowest of its triangles above a point, found through a tree of boxes.
 //!
-//! Nothing is asked about inside and outside, so an open mesh has an underside, too: that of its sheets.
+//! Inside and outside play no role, so an open mesh has an underside, too: that of its sheets.
 
 use crate::math::{Rotation, cross, dot, scaled};
 

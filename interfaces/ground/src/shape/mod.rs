@@ -1,4 +1,4 @@
-//! A shape at a pose: what contact detection, soils and sensors ask of it.
+//! A shape at a pose: the queries of contact detection, soils and sensors.
 
 mod lower;
 mod mesh;

@@ -5,7 +5,7 @@ use super::lower::WALL;
 use super::slope::EDGE;
 use crate::math::Rotation;
 
-/// Planes that are looked at side by side.
+/// Planes that are evaluated side by side.
 const LANES: usize = 4;
 
 /// The faces by the side they look to; world axes, relative to the origin of the mesh.

@@ -15,7 +15,7 @@ impl Placed {
     }
 
     /// Reference point of the contact with ground of the given unit normal: at the level of the lowest point
-    /// along −normal, sideways the middle of what lies lowest.
+    /// along −normal, sideways the middle of the lowest part.
     ///
     /// A flat side that tilts moves the point from its middle to its edge over one degree, so that rounding
     /// does not throw it from corner to corner.

@@ -5,11 +5,11 @@ pub const TG_ABI_MAJOR: u32 = 3;
 /// Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`.
 pub const TG_ABI_MINOR: u32 = 1;
 
-/// What a call answers; anything else than the values below counts as `TG_FATAL`.
+/// Status of a call; any value other than those below counts as `TG_FATAL`.
 pub type TgStatus = i32;
 /// Success.
 pub const TG_OK: i32 = 0;
-/// The step is too long: `reached` (s) says how far it could go. The host may repeat with a shorter step.
+/// The step is too long: `reached` (s) is how far it could go. The host may repeat with a shorter step.
 pub const TG_DISCARD: i32 = 1;
 /// A value, name or argument is not acceptable; the instance is unchanged and usable. Text: `last_error`.
 pub const TG_REFUSED: i32 = 2;

@@ -1,4 +1,4 @@
-//! What the host offers at `instantiate`.
+//! Services of the host at `instantiate`.
 use super::constants::TgStatus;
 use super::law::TgOpenLaw;
 use std::ffi::{c_char, c_void};
@@ -57,7 +57,7 @@ pub struct TgHost {
     /// When: in a call of the instance. Thread: that of the call, or of a job.
     pub parallel_for:
         Option<unsafe extern "C" fn(ctx: *mut c_void, n: usize, job: TgJob, arg: *mut c_void) -> TgStatus>,
-    /// 1: the user asked to stop; long calls look at it.
+    /// 1: the user requested a stop; long calls poll it.
     /// When: from `instantiate` to `free`. Thread: any.
     pub cancelled: Option<unsafe extern "C" fn(ctx: *mut c_void) -> i32>,
     /// Seed for everything random in this instance.
@@ -70,7 +70,7 @@ pub struct TgHost {
     pub gravity: [f64; 3],
     /// The ground at the start; null: the scenario has none.
     pub terrain: *const TgTerrain,
-    /// Largest number of ground nodes that a step may show; a hint for what to reserve.
+    /// Largest number of ground nodes that a step may show; a hint for the memory to reserve.
     pub max_nodes: u32,
     /// 0.
     pub reserved: u32,

@@ -75,7 +75,7 @@ pub struct TgScene {
     pub n_shapes: u32,
 }
 
-/// What a shape is made of, for sensors. Since 3.1.
+/// Material of a shape, for sensors. Since 3.1.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgMaterial {
@@ -105,7 +105,7 @@ pub struct TgJoint {
     pub position: u32,
     /// Id of that of its velocity, rad/s or m/s.
     pub velocity: u32,
-    /// Id of that of what its motor gives, N m or N.
+    /// Id of that of the torque or force of its motor, N m or N.
     pub torque: u32,
     /// Id of that of the most that its motor can give, N m or N.
     pub torque_limit: u32,
@@ -170,7 +170,7 @@ pub struct TgEnergy {
     /// Energy turned into heat inside since the start; >= 0, never falls.
     pub dissipated: f64,
     /// Work done on this subsystem through its ports since the start. Of a soil: by the wrench of its own law at the motion
-    /// that was committed, not by the wrench that `commit` tells it.
+    /// that was committed, not by the wrench passed to `commit`.
     pub port_work: f64,
     /// Mechanical work that its own motors have put in since the start.
     pub actuator_work: f64,

@@ -1,4 +1,4 @@
-//! What an instance that sees is offered, its streams and its overlays; all since 3.1.
+//! The world as an instance sees it, its streams and its overlays; all since 3.1.
 use super::constants::TgStatus;
 use super::scene::{TgBodyState, TgField, TgFieldTile, TgJoint, TgMaterial, TgPose, TgScene};
 use std::ffi::{c_char, c_void};
@@ -39,11 +39,11 @@ pub struct TgRay {
     pub range: f64,
 }
 
-/// What a ray met first.
+/// First hit of a ray.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgRayHit {
-    /// Distance from the start, m; inf: nothing was met, and the rest says nothing.
+    /// Distance from the start, m; inf: nothing was met, and the rest is meaningless.
     pub distance: f64,
     /// Unit normal of the surface, world, against the ray.
     pub normal: [f64; 3],
@@ -53,11 +53,11 @@ pub struct TgRayHit {
     pub body: u32,
     /// Id of the shape; UINT32_MAX: the ground.
     pub shape: u32,
-    /// What it is made of.
+    /// Material of the shape.
     pub material: TgMaterial,
 }
 
-/// What is not passed by.
+/// Shapes and ground that a ray can meet.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgRayMask {
@@ -70,9 +70,9 @@ pub struct TgRayMask {
     pub skip: TgBodyRef,
 }
 
-/// The committed world at the end of a step, and within the step interpolated to the time asked for; valid during
-/// `observe` only, and to be called from its thread. Nothing of what comes after the step is known. An answer depends on the
-/// question and the committed states alone. Asked outside of `observe` it answers nothing, and the call counts as TG_FATAL.
+/// The committed world at the end of a step, and within the step interpolated to the requested time; valid during
+/// `observe` only, and to be called from its thread. Nothing after the step is known. An answer depends on the question and
+/// the committed states alone. Called outside of `observe` it returns nothing, and the call counts as TG_FATAL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgWorld {
@@ -84,7 +84,7 @@ pub struct TgWorld {
     pub subsystems: *const *const c_char,
     /// Changes whenever names or scenes of subsystems do.
     pub revision: u64,
-    /// First and last time that can be asked for, s: the committed step. Times outside count as the nearest end.
+    /// First and last time of a query, s: the committed step. Times outside count as the nearest end.
     pub interval: [f64; 2],
     /// First argument of the functions below.
     pub ctx: *mut c_void,
@@ -179,7 +179,7 @@ pub struct TgStream {
     pub help: *const c_char,
     /// Most messages per second, 1/s; 0: whenever something happens.
     pub rate_hz: f64,
-    /// Most bytes of a message. What is longer is left out with a warning.
+    /// Most bytes of a message. Longer ones are dropped with a warning.
     pub most_bytes: u32,
     /// 0.
     pub reserved: u32,
@@ -189,13 +189,13 @@ pub struct TgStream {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgMessage {
-    /// Time of what it tells, s.
+    /// Time of its content, s.
     pub time: f64,
     /// Its bytes; they stay valid until the next call that may change the committed state.
     pub bytes: *const u8,
     /// Their number.
     pub size: usize,
-    /// 1: the last committed step made a message; 0: it made none, and the rest says nothing. Comes as 0.
+    /// 1: the last committed step made a message; 0: it made none, and the rest is meaningless. Comes as 0.
     pub is_there: u32,
     /// 0.
     pub reserved: u32,
@@ -207,7 +207,7 @@ pub struct TgMessage {
 pub struct TgOverlay {
     /// Name of the layer.
     pub layer: *const c_char,
-    /// What a text says; else null.
+    /// Text of a TG_TEXT; else null.
     pub text: *const c_char,
     /// Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world, UINT32_MAX - 1: the body that
     /// the parameter `mount` names.

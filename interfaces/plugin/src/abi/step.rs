@@ -1,4 +1,4 @@
-//! What goes into and comes out of the calls of a step. Laid out as the types of the subsystem interface
+//! Arguments and results of the calls of a step. Laid out as the types of the subsystem interface
 //! (held equal by `abi::layout`), so that ports and nodes cross without a copy.
 
 /// t_min <= T_n <= t_max, |T_t| <= mu T_n, residual x1 - x2 + compliance T.
@@ -31,7 +31,7 @@ pub struct TgPort {
     pub mask: u32,
     /// First component of this port in packed vectors.
     pub first: u32,
-    /// What this subsystem has there: index into its scene's bodies, or a cell, or a terminal.
+    /// Index of the body of its scene, of the cell or of the terminal at this port.
     pub body: u32,
     /// Id of the scene shape on the side of the body; UINT32_MAX: none.
     pub shape: u32,
@@ -89,7 +89,7 @@ pub struct TgStep {
     pub nodes: *const TgNode,
 }
 
-/// What acts on the ports during a trial; packed. Pointers that the kind does not use are null.
+/// Input on the ports during a trial; packed. Pointers that the kind does not use are null.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgInput {
@@ -115,7 +115,7 @@ pub struct TgMotion {
     pub v: *const f64,
 }
 
-/// Answer of a trial at its end; packed. The vectors come filled with NaN: what stays NaN is an error.
+/// Answer of a trial at its end; packed. The vectors come filled with NaN: an entry that stays NaN is an error.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgResponse {

@@ -31,7 +31,7 @@ pub struct TgSubsystem {
     pub schema: Option<unsafe extern "C" fn() -> *const c_char>,
     /// Makes an instance. `config` is a JSON object with a value for every parameter of the schema that the
     /// scenario sets or that has a default. May allocate, read files below host->folder and read the terrain.
-    /// On failure *instance stays null and last_error(NULL) says why.
+    /// On failure *instance stays null and last_error(NULL) has the reason.
     /// When: at any time. Thread: any thread, several at once.
     pub instantiate: Option<
         unsafe extern "C" fn(
@@ -43,7 +43,7 @@ pub struct TgSubsystem {
     /// Ends an instance.
     /// When: once, last. Thread: that of the instance.
     pub free: Option<unsafe extern "C" fn(instance: *mut c_void)>,
-    /// Bits TG_CAN_...: what this instance can do.
+    /// Bits TG_CAN_...: the capabilities of this instance.
     /// When: at any time after `instantiate`. Thread: that of the instance.
     pub capabilities: Option<unsafe extern "C" fn(instance: *mut c_void) -> u32>,
     /// Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
@@ -63,7 +63,7 @@ pub struct TgSubsystem {
 
     /// Required up to here; below, null means: not offered.
     ///
-    /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+    /// Paper, step 1. The ports of this step (grounds come first). Returns the committed X, V and,
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan phi, t_max), one
     /// per port; a ground's x along n is its own surface x2 under the body.
     /// When: in a step, before its trials; again when the step is repeated. Thread: that of the instance.
@@ -214,13 +214,13 @@ pub struct TgSubsystem {
     pub law: *const TgNodeLaw,
 
     /// Since 3.1, as all below. Looks at the committed world: with the capability TG_CAN_SEE, after all instances have
-    /// committed the step, which `step` shows without ports. What was seen belongs to the committed state: variables,
-    /// streams and `save_state` tell it from t + h on. `world` is valid for the call only.
-    /// When: once per step, after `commit`; at the start of a run with h = 0. Thread: that of the instance.
+    /// committed the step, which `step` shows without ports. Observations belong to the committed state: variables,
+    /// streams and `save_state` contain it from t + h on. `world` is valid for the call only. When: once per step,
+    /// after `commit`; at the start of a run with h = 0. Thread: that of the instance.
     pub observe: Option<
         unsafe extern "C" fn(instance: *mut c_void, step: *const TgStep, world: *const TgWorld) -> TgStatus,
     >,
-    /// All joints of the scene, and their number; valid and constant until `free`. Null: none is told.
+    /// All joints of the scene, and their number; valid and constant until `free`. Null: none.
     /// When: at any time after `instantiate`. Thread: that of the instance.
     pub scene_joints:
         Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgJoint) -> usize>,
@@ -237,15 +237,14 @@ pub struct TgSubsystem {
     /// All streams, and their number; valid and constant until `free`.
     /// When: at any time after `instantiate`. Thread: that of the instance.
     pub streams: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgStream) -> usize>,
-    /// The message that the last committed step made on a stream; may be asked for any number of times.
+    /// The message that the last committed step made on a stream; may be called any number of times.
     /// When: at any time. Thread: that of the instance.
     pub stream:
         Option<unsafe extern "C" fn(instance: *mut c_void, stream: usize, out: *mut TgMessage) -> TgStatus>,
-    /// What is shown beside the bodies, and its number; valid until the next call of the instance. Asked only when
-    /// somebody looks.
-    /// When: at any time. Thread: that of the instance.
+    /// Overlays to show with the bodies, and their number; valid until the next call of the instance. Called only when
+    /// they are displayed or recorded. When: at any time. Thread: that of the instance.
     pub overlays: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgOverlay) -> usize>,
 }
 
-/// What a module exports under the name `terraglue_subsystem`.
+/// The function that a module exports as `terraglue_subsystem`.
 pub type TgEntry = unsafe extern "C" fn() -> *const TgSubsystem;

@@ -109,7 +109,7 @@ fn set_failure(text: &str) {
 
 /// The table of a module. Its texts live as long as the process: this is called once per library.
 ///
-/// `fallback_name` stands in where the module's schema cannot be had; `description` is the text of the section
+/// `fallback_name` replaces the name where the module has no schema; `description` is the text of the section
 /// `.terraglue`.
 pub fn table<M: Module>(fallback_name: &str, description: &'static [u8]) -> TgSubsystem {
     let schema = catch_unwind(M::schema).ok();

@@ -22,7 +22,7 @@ pub(super) struct ForeignHost {
     terrain_open: AtomicBool,
 }
 
-// SAFETY: the ABI says that the host's functions may be called from any thread while the instance lives.
+// SAFETY: by the ABI the host's functions may be called from any thread while the instance lives.
 unsafe impl Send for ForeignHost {}
 // SAFETY: as above.
 unsafe impl Sync for ForeignHost {}
@@ -37,7 +37,7 @@ impl ForeignHost {
         }
         // SAFETY: size and versions are the first fields of every version.
         let (size, major) = unsafe { ((*host).size as usize, (*host).abi_major) };
-        // what came with later minors may be missing
+        // functions of later minors may be missing
         const FIRST: usize = offset_of!(TgHost, law);
         if major != TG_ABI_MAJOR || size < FIRST {
             return Err(Error::Fatal(format!(
@@ -143,7 +143,7 @@ unsafe extern "C" fn run_job(arg: *mut c_void, index: usize) {
 /// The host's terrain.
 struct ForeignTerrain(TgTerrain);
 
-// SAFETY: the ABI says that the host's functions may be called from any thread during `instantiate`.
+// SAFETY: by the ABI the host's functions may be called from any thread during `instantiate`.
 unsafe impl Send for ForeignTerrain {}
 // SAFETY: as above.
 unsafe impl Sync for ForeignTerrain {}

@@ -23,7 +23,7 @@ pub(super) struct Known {
     subsystems: Vec<Others>,
 }
 
-/// Another subsystem, copied when it is asked for.
+/// Another subsystem, copied on demand.
 #[derive(Default)]
 struct Others {
     scene: OnceCell<Option<Scene>>,
@@ -72,7 +72,7 @@ impl ForeignWorld<'_> {
 
     fn copied(&self, subsystem: u32) -> Option<Scene> {
         let mut s = TgScene { bodies: std::ptr::null(), shapes: std::ptr::null(), n_bodies: 0, n_shapes: 0 };
-        // SAFETY: the host's functions with the host's context; what they answer is constant for this revision.
+        // SAFETY: the host's functions with the host's context; their answers are constant for this revision.
         unsafe {
             let status = (self.raw.scene?)(self.raw.ctx, subsystem, &raw mut s);
             let (mut joints, mut materials) = (std::ptr::null(), std::ptr::null());

@@ -31,7 +31,7 @@ unsafe fn get_values(e: &Exported, v: &TgValues) -> Result {
             TG_U64 => ValuesMut::U64(slice_mut(v.data.cast(), n)),
             TG_ENUMERATION => ValuesMut::Enumeration(slice_mut(v.data.cast(), n)),
             TG_BOOL => {
-                // Zeros first: what the host left there need not be a bool.
+                // Zeros first: the bytes left by the host need not be bools.
                 slice_mut::<u8>(v.data.cast(), n).fill(0);
                 ValuesMut::Bool(slice_mut(v.data.cast(), n))
             }

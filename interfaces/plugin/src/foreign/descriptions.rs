@@ -1,4 +1,4 @@
-//! Copies what a foreign instance says about itself; checked once, so that nothing foreign is read later.
+//! Copies the descriptions of a foreign instance; checked once, so that nothing foreign is read later.
 
 use super::raw::Raw;
 use crate::abi::*;

@@ -119,7 +119,7 @@ unsafe extern "C" fn log(ctx: *mut c_void, level: i32, text: *const c_char) {
     }
 }
 
-/// The argument of a foreign job; the module says that its jobs may run on several threads.
+/// The argument of a foreign job; the module guarantees that its jobs may run on several threads.
 struct Arg(*mut c_void);
 // SAFETY: terraglue.h asks for jobs that may run on any thread.
 unsafe impl Sync for Arg {}

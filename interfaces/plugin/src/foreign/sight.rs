@@ -11,13 +11,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use terraglue_subsystem::{BodyRef, BodyState, Error, Figure, Overlay, RayMask, Result, ShapeRef, World};
 
 /// The world of one instance. It stays at one place as long as the instance: a module that keeps a pointer to it and asks outside of
-/// `observe` gets no answer, and its next call tells of it.
+/// `observe` gets no answer, and its next call reports it.
 pub(super) struct Shown {
     table: Cell<TgWorld>,
     copies: RefCell<Copies>,
     /// The world during a call.
     open: Cell<Option<*const (dyn World + 'static)>>,
-    /// Whether it was asked while it was closed.
+    /// Whether it was called while it was closed.
     misused: Cell<bool>,
 }
 
@@ -30,7 +30,7 @@ struct Copies {
     subsystems: Vec<Others>,
 }
 
-/// Another subsystem, made when it is asked for.
+/// Another subsystem, made on demand.
 #[derive(Default)]
 struct Others {
     scene: OnceCell<Option<SceneTable>>,
@@ -96,7 +96,7 @@ impl Shown {
         done.and_then(|()| self.check())
     }
 
-    /// Refuses an instance that has asked while the world was closed.
+    /// Refuses an instance that has called it while the world was closed.
     pub(super) fn check(&self) -> Result {
         if !self.misused.get() {
             return Ok(());
@@ -118,7 +118,7 @@ impl Copies {
     }
 }
 
-/// The world during a call, with what was copied of it.
+/// The world during a call, with the parts copied so far.
 struct Open<'a> {
     world: &'a dyn World,
     copies: Ref<'a, Copies>,

@@ -227,7 +227,7 @@ impl Subsystem for ForeignSubsystem {
         // SAFETY: a live instance and room for all shapes.
         let status = unsafe { f(self.raw.instance, out.len(), first) };
         for k in 0..out.len() {
-            // SAFETY: inside `out`, as bytes: what the module wrote need not be a bool yet.
+            // SAFETY: inside `out`, as bytes: the bytes written by the module need not be bools yet.
             unsafe { *first.add(k) = u8::from(*first.add(k) != 0) }
         }
         self.raw.check(status, f64::NAN)

@@ -69,7 +69,7 @@ impl ForeignSubsystem {
         let first: *mut u8 = out.as_mut_ptr().cast();
         let result = self.get_raw(TG_BOOL, ids, first.cast(), out.len());
         for k in 0..out.len() {
-            // SAFETY: inside `out`, as bytes: what the module wrote need not be a bool yet.
+            // SAFETY: inside `out`, as bytes: the bytes written by the module need not be bools yet.
             unsafe { *first.add(k) = u8::from(*first.add(k) != 0) }
         }
         result

@@ -1,4 +1,4 @@
-//! The module gait as a dynamic library, and what its section says of it.
+//! The module gait as a dynamic library, with the description in its section.
 terraglue_plugin::export_subsystem! {
     terraglue_gait::Gait,
     kind: "controller",

@@ -1,4 +1,4 @@
-//! The module laser-scanner as a dynamic library, and what its section says of it.
+//! The module laser-scanner as a dynamic library, with the description in its section.
 terraglue_plugin::export_subsystem! {
     terraglue_laser_scanner::LaserScanner,
     kind: "sensor",

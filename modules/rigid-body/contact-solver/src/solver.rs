@@ -88,7 +88,7 @@ impl Solver {
         }
     }
 
-    /// Solves for r, starting from what r holds; r is the best point found also where the tolerance was not met.
+    /// Solves for r, starting from the content of r; r is the best point found even if the tolerance was not met.
     pub fn solve(&mut self, problem: &Problem, options: &Options, r: &mut [f64]) -> Report {
         let n = problem.q.len();
         self.u.resize(n, 0.0);

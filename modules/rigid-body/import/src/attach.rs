@@ -1,4 +1,4 @@
-//! A second robot or a thing beside the first one: its bodies, joints and shapes go on in the same lists.
+//! A second robot or object next to the first one: its bodies, joints and shapes are appended to the same lists.
 
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Loop, Plane, Robot, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};

@@ -35,8 +35,8 @@ pub(crate) fn mass_spread(file: &str, bodies: &[Body]) -> Option<String> {
     })
 }
 
-/// Reads the inertial of a link, in its axes; none where it has neither mass nor inertia. What no body can have is refused
-/// here where it is meant for none: whether the rest can be simulated, the links that move as one decide together.
+/// Reads the inertial of a link, in its axes; none where it has neither mass nor inertia. Values that are impossible for
+/// any body are refused here; whether the rest can be simulated is decided for links that move as one.
 pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Option<Inertial>, Error> {
     let (mass, i) = (link.inertial.mass.value, &link.inertial.inertia);
     let tensor = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
@@ -47,7 +47,7 @@ pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Option<Inertial>,
         return Err(source.link(&link.name, not_positive(mass)));
     }
     in_range(mass, &tensor).map_err(|problem| source.link(&link.name, problem))?;
-    // A value within rounding of 0, on either side, counts as none; a little below 0 beside larger ones is repaired.
+    // A value within rounding of 0, on either side, counts as none; a little below 0 among larger ones is repaired.
     let largest = tensor.amax();
     let tensor = if largest <= SMALLEST { Matrix3::zeros() } else { tensor };
     let least = -(ROUNDING * largest).max(SMALLEST);

@@ -71,16 +71,16 @@ impl Options {
     }
 }
 
-/// Reads a file of either format, which the root of its text tells; xacro is expanded first.
+/// Reads a file of either format, which the root element determines; xacro is expanded first.
 ///
 /// # Errors
-/// [`Error`] with file, line and element: the file cannot be read, or says what cannot be simulated.
+/// [`Error`] with file, line and element: the file cannot be read, or its model cannot be simulated.
 pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
     let mut text = terraglue_subsystem::files::read_text(path)
         .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
     syntax::check_depth(&Source { file: &file, text: &text })?;
-    // URDF may hold an element <mujoco>, too, for MuJoCo's own reader. What is no XML its reader complains of.
+    // URDF may hold an element <mujoco>, too, for MuJoCo's own reader. Text that is no XML is refused by its reader.
     let (is_mjcf, is_xacro) = match roxmltree::Document::parse(&text) {
         Ok(document) => {
             let is_mjcf = document.root_element().has_tag_name("mujoco");

@@ -1,5 +1,5 @@
-//! Links that move as one: what has no mass, or an inertia that no body of its own can have, becomes part of what it is fixed
-//! to. Links that can stand alone stay bodies of their own, so that what acts on a foot can be told from what acts on its leg.
+//! Links that move as one: a link without mass, or with an inertia that no body can have, becomes part of the link that it is
+//! fixed to. Links that can stand alone stay bodies of their own, so that forces on a foot and on its leg stay separate.
 
 use crate::check::isometry;
 use crate::error::Source;
@@ -22,7 +22,7 @@ pub(crate) struct Merged {
     massive: Vec<Vec<usize>>,
 }
 
-/// Groups the links; `order` has parents first. What is fixed to a massless root called `world` belongs to it.
+/// Groups the links; `order` has parents first. Links fixed to a massless root called `world` belong to it.
 pub(crate) fn merge(robot: &Robot, order: &[LinkPlace], inertials: &[Option<Inertial>]) -> Merged {
     let n = robot.links.len();
     let mut m = Merged {

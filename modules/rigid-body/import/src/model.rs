@@ -36,7 +36,7 @@ pub struct Robot {
 /// Coordinate of the follower = ratio · coordinate of the leader + offset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coupling {
-    /// Name, unique among what couples.
+    /// Name, unique among couplings and loops.
     pub name: String,
     /// Index of the joint that follows.
     pub follower: usize,
@@ -51,7 +51,7 @@ pub struct Coupling {
 /// Two bodies held together beyond the tree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loop {
-    /// Name, unique among what couples.
+    /// Name, unique among couplings and loops.
     pub name: String,
     /// The bodies; none: the world. Different.
     pub bodies: [Option<usize>; 2],
@@ -109,7 +109,7 @@ pub struct Shape {
     pub collides: bool,
     /// Coulomb friction; none: the scenario's. Of two shapes the larger one counts.
     pub friction: Option<f64>,
-    /// Bits of what it is and of what it can meet: two shapes meet if one's group is in the other's mask.
+    /// Collision group and mask, as bits: two shapes meet if one's group is in the other's mask.
     pub group: u32,
     /// See `group`.
     pub mask: u32,
@@ -153,9 +153,9 @@ pub enum ShapeGeometry {
     Hull(Arc<Mesh>),
     /// A mesh that is not convex and moves.
     Concave {
-        /// As it is: what soil meets.
+        /// As it is, for contact with soil.
         mesh: Arc<Mesh>,
-        /// Its convex hull: what bodies and rigid ground meet.
+        /// Its convex hull, for contact with bodies and rigid ground.
         hull: Arc<Mesh>,
     },
     /// Triangles as they are; of shapes that stand still only.
@@ -211,7 +211,7 @@ pub struct AxisData {
     pub stiffness: f64,
     /// See `stiffness`.
     pub reference: f64,
-    /// Largest torque that the file allows at the joint (`effort` of URDF), N m; none: it says nothing.
+    /// Largest torque that the file allows at the joint (`effort` of URDF), N m; none: not given.
     pub effort: Option<f64>,
     /// The motor; none: the file has none.
     pub drive: Option<Drive>,

@@ -1,4 +1,4 @@
-//! Masses and sizes that no part of a robot has, most often because their unit is another one: used as they stand, and told.
+//! Masses and sizes that no part of a robot has, most often by another unit: used as given, and reported.
 
 use crate::inertia::Inertial;
 use crate::model::ShapeGeometry;

@@ -1,4 +1,4 @@
-//! The robot as a whole: where its bodies are at given coordinates, what it weighs, how far down it reaches.
+//! The robot as a whole: the places of its bodies at given coordinates, its mass, and its lowest point.
 
 use crate::inertia::Inertial;
 use crate::model::{Base, Joint, JointKind, Robot, Shape, ShapeGeometry};

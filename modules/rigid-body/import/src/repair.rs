@@ -8,10 +8,10 @@ use nalgebra::{Matrix3, SymmetricEigen};
 /// A body is at least this part of its size thick, squared: rods and sheets keep an inertia that can be inverted.
 const THINNEST: f64 = 1e-6;
 
-/// Radius of the ball that stands in for a body of unknown shape, m.
+/// Radius of the ball that replaces a body of unknown shape, m.
 const BALL: f64 = 0.01;
 
-/// Gives a body an inertia that it can have; what was wrong and what is used instead, if anything was.
+/// Gives a body an inertia that it can have; returns the fault and the replacement, if there was one.
 pub(crate) fn repair(body: &mut Body) -> Option<String> {
     let flaw = flaw(&body.inertia)?;
     let (used, how) = if body.inertia == Matrix3::zeros() {

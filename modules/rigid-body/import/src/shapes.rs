@@ -1,4 +1,4 @@
-//! Shapes of the links of a URDF file; convex meshes become hulls where they move, others keep their own form beside it.
+//! Shapes of the links of a URDF file; convex meshes become hulls where they move, others also keep their own form.
 
 use crate::check::isometry;
 use crate::error::{Error, Source};
@@ -8,10 +8,10 @@ use crate::plausible;
 use std::sync::Arc;
 use urdf_rs::{Geometry, Link, Pose};
 
-/// A mesh whose hull is larger than this many times what it encloses is called hollow.
+/// A mesh whose hull has more than this many times its own volume is called hollow.
 const HOLLOW: f64 = 1.05;
 
-/// Reads shapes and remembers what is to be said about them.
+/// Reads shapes and collects notices about them.
 pub(crate) struct Shapes<'a> {
     pub source: &'a Source<'a>,
     pub folders: &'a Folders,
@@ -46,7 +46,7 @@ impl<'a> Shapes<'a> {
         }
     }
 
-    /// All shapes of a link in its own frame; what is seen and hit appears once. `still`: the link is the world.
+    /// All shapes of a link in its own frame; one both seen and hit appears once. `still`: the link is the world.
     pub fn of(&mut self, link: &Link, still: bool) -> Result<Vec<Shape>, Error> {
         let mut shapes: Vec<Shape> = Vec::new();
         for c in &link.collision {
@@ -93,7 +93,7 @@ impl<'a> Shapes<'a> {
         (self.warnings, self.notices)
     }
 
-    /// Whether a shape has no size at all, which is said once: files have them where nothing is meant.
+    /// Whether a shape has no size at all, which is reported once: files have them as placeholders.
     fn is_nothing(&mut self, link: &Link, geometry: &Geometry) -> bool {
         let nothing = match geometry {
             Geometry::Box { size } => size.0 == [0.0; 3],
@@ -178,12 +178,12 @@ pub(crate) fn drawn(geometry: ShapeGeometry) -> ShapeGeometry {
     }
 }
 
-/// Whether the hull fills what the mesh leaves open.
+/// Whether the hull fills space that the mesh leaves open.
 pub(crate) fn hollow(mesh: &Mesh, hull: &Mesh) -> bool {
     mesh.is_closed() && hull.solid().volume > HOLLOW * mesh.solid().volume.abs()
 }
 
-/// Says what was made of a mesh that moves.
+/// The notice about the replacement of a mesh that moves.
 pub(crate) fn hull_notice(mesh: &Mesh, (hull, beyond): (&Mesh, f64), convex: bool) -> String {
     let corners = hull.points.len();
     let mut text = if convex {

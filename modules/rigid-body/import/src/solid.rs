@@ -44,7 +44,7 @@ pub(crate) fn placed(mass: f64, solid: &Solid, pose: &Isometry3<f64>) -> Inertia
     Inertial { mass, com: (pose * Point3::from(solid.centre)).coords, tensor }
 }
 
-/// A mass spread evenly over shapes; none where they enclose nothing. What overlaps counts twice.
+/// A mass spread evenly over shapes; none where they enclose nothing. Overlaps count twice.
 pub(crate) fn evenly<'a>(mass: f64, shapes: impl Iterator<Item = &'a Shape>) -> Option<Inertial> {
     let solids: Vec<(Solid, &Isometry3<f64>)> =
         shapes.map(|s| (solid(&s.geometry), &s.body_from_shape)).filter(|(s, _)| s.volume > 0.0).collect();

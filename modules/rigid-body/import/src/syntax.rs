@@ -116,20 +116,20 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
     Ok(())
 }
 
-/// Attributes that `urdf-rs` wants and that the format leaves out where they say nothing: element, attribute, value.
+/// Attributes that `urdf-rs` requires and that are optional in the format: element, attribute, value.
 const LEFT_OUT: [(&str, &str, &str); 3] =
     [("limit", "effort", "0"), ("limit", "velocity", "0"), ("texture", "filename", "")];
 
-/// The same for elements: the one around, and what stands in it without being said.
+/// The same for elements: the parent, the child, and its default.
 const EMPTY: [(&str, &str, &str); 2] = [
     ("inertial", "mass", "<mass value=\"0\"/>"),
     ("inertial", "inertia", "<inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>"),
 ];
 
-/// The text with the prefixes declared that it uses without saying what they are, as most readers of URDF bear it; lines stay.
+/// The text with declarations for its undeclared prefixes, which most readers of URDF tolerate; lines stay.
 pub(crate) fn declared(text: &str) -> String {
     let mut text = text.to_owned();
-    // As many as anybody would have.
+    // More than any file has.
     for _ in 0..16 {
         let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = Document::parse(&text) else { break };
         let Some(root) = text.find("<robot").map(|at| at + "<robot".len()) else { break };

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Says which controller drives a joint: nearly every robot of ROS has them, and nothing mechanical is lost without.
 const TRANSMISSION: &str = "transmission";
 
-/// An element, what may stand in it, and its attributes. Colours and textures are left to viewers.
+/// An element, its children, and its attributes. Colours and textures are left to viewers.
 const KNOWN: [(&str, &[&str], &[&str]); 21] = [
     ("robot", &["link", "joint", "material", TRANSMISSION], &["name", "version"]),
     ("link", &["inertial", "visual", "collision"], &["name"]),
@@ -36,7 +36,7 @@ const KNOWN: [(&str, &[&str], &[&str]); 21] = [
 /// By kind: the warning of the first, and how many there are.
 type Found = BTreeMap<String, (String, usize)>;
 
-/// Warnings, one for every kind of element or attribute that does nothing, and notices of what is known and still not used.
+/// Warnings, one for every kind of element or attribute without effect, and notices of known ones that are not used.
 pub(crate) fn told(source: &Source, robot: &urdf_rs::Robot) -> (Vec<String>, Vec<String>) {
     let Ok(document) = Document::parse(source.text) else { return Default::default() };
     let mut found = Found::new();

@@ -14,10 +14,10 @@ use crate::unread;
 use nalgebra::{Unit, Vector3};
 use urdf_rs::JointType;
 
-/// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
+/// Reads the text of a file; `file` appears in messages and gives the folder of meshes.
 ///
 /// # Errors
-/// [`Error`] with line and element: what cannot be read or simulated.
+/// [`Error`] with line and element: a part that cannot be read or simulated.
 pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
     let text = crate::syntax::declared(text);
     let source = &Source { file, text: &text };
@@ -109,7 +109,7 @@ fn bodies_and_joints(
     Ok((bodies, joints))
 }
 
-/// Gives the bodies the shapes of their links; what stands still in the world is left.
+/// Gives the bodies the shapes of their links; returns the shapes that stand still in the world.
 fn give_shapes(
     robot: &urdf_rs::Robot,
     order: &[LinkPlace],

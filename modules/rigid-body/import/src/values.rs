@@ -1,7 +1,7 @@
 //! Checks of the attributes of both formats: numbers are finite and of a size that can be computed with, names are not
 //! empty.
 //!
-//! Every attribute is looked at, also those that only some models have, and those of default classes that nothing uses yet: a
+//! Every attribute is checked, also those that only some models have, and those of default classes that nothing uses yet: a
 //! `nan` is never meant.
 
 use roxmltree::Node;

@@ -1,4 +1,4 @@
-//! COLLADA meshes of URDF: units, places of parts, kinds of faces, and what is refused.
+//! COLLADA meshes of URDF: units, places of parts, kinds of faces, and refusals.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::path::{Path, PathBuf};

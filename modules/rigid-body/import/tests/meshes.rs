@@ -1,4 +1,4 @@
-//! Mesh files of URDF: formats, scale, where they are looked for, hulls of what moves and triangles of what stands.
+//! Mesh files of URDF: formats, scale, search paths, hulls of moving parts and triangles of fixed ones.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::path::{Path, PathBuf};
@@ -138,7 +138,7 @@ fn packages_are_found_by_scenario_folder_and_environment() {
     write(&root.join("elsewhere/a.stl"), ascii_stl());
     write(&root.join("ros/tools/a.stl"), ascii_stl());
     let urdf = |file: &str| robot(&workspace.join("arm_description/urdf"), &format!("filename=\"{file}\""));
-    // Above the file by the name in package.xml and by that of the folder; beside it; by a plain path.
+    // Above the file by the name in package.xml and by that of the folder; next to it; by a plain path.
     for file in [
         "package://arm/meshes/a.stl",
         "package://arm_description/meshes/a.stl",

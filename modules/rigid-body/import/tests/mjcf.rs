@@ -1,4 +1,4 @@
-//! MJCF comes out as the same robot as its URDF twin; what cannot be used is named.
+//! MJCF comes out as the same robot as its URDF twin; unused parts are named.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::path::Path;

@@ -50,7 +50,7 @@ fn included_files_stand_where_they_are_named() {
     assert_eq!(hip.limits, None);
     let ball = 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
     assert!((robot.bodies[0].mass - 500.0 * ball).abs() < 1e-9);
-    // Messages name the file that says it.
+    // Messages name the included file.
     let text = robot.warnings.join("\n");
     assert!(text.contains("parts/foot.xml:3: <joint> `k` has `ref`"), "{text}");
 }

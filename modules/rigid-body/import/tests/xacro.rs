@@ -1,4 +1,4 @@
-//! xacro goes through the Python package of that name; where that is missing, the error says how to get it.
+//! xacro goes through the Python package of that name; where that is missing, the error explains how to get it.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ fn a_file_is_expanded_where_the_package_is_there_and_told_how_to_get_it_otherwis
     let robot = read.unwrap();
     assert_eq!(robot.bodies.iter().map(|b| b.mass).collect::<Vec<_>>(), [5.0, 5.0]);
     assert_eq!(robot.joints[0].name, "wrist");
-    // Without the package the error says which one, and how to name it.
+    // Without the package the error gives its name, and how to set it.
     let message = read_robot(&arm, &Options::default()).unwrap_err().to_string();
     assert!(message.contains("no package parts") && message.contains("packages = { parts ="), "{message}");
     // An error in the expanded text has a line there.

@@ -75,7 +75,7 @@ struct Node {
     /// Whether the joint holds at all; without, the body is a root.
     hangs: bool,
     inertia: Inertia,
-    /// Its own mass and mean moment of inertia, without what hangs below.
+    /// Its own mass and mean moment of inertia, without its descendants.
     own: (f64, f64),
     /// From the parent's centre of mass to its own.
     shift: Vector3<f64>,
@@ -209,12 +209,12 @@ impl Forest {
         self.sweep(x, Node::forward, Node::backward);
     }
 
-    /// The same without the impulses of rigid rows, which become 0 and which [`Forest::impulses`] tells.
+    /// The same without the impulses of rigid rows, which become 0; [`Forest::impulses`] computes them.
     pub fn substitute_rates(&self, x: &mut [f64]) {
         self.sweep(x, Node::forward_rates, Node::backward_rates);
     }
 
-    /// From the leaves to the roots, each body handing what is left to its parent, and back.
+    /// From the leaves to the roots, each body handing the remainder to its parent, and back.
     #[inline]
     fn sweep(
         &self,
@@ -234,9 +234,9 @@ impl Forest {
         }
     }
 
-    /// Writes the impulses of rigid rows into a solution whose rates are known: what a body and all below it get of the
-    /// right-hand side and do not need for their rates, their joint carries. `masses`, `inertia`: as factored; `below`: a
-    /// buffer.
+    /// Writes the impulses of rigid rows into a solution whose rates are known: the joint carries the part of the
+    /// right-hand side of a body and all below it that their rates do not need. `masses`, `inertia`: as factored;
+    /// `below`: a buffer.
     pub fn impulses(
         &self,
         masses: &[f64],
@@ -320,8 +320,8 @@ impl Node {
         rigid.iter().any(|b| *b != 0.0).then(|| self.rows.motion_of(&rigid))
     }
 
-    /// Eliminates the body from the right-hand side; what is left for the parent. Leaves each freedom's own share
-    /// in its row, or for a root in its rates.
+    /// Eliminates the body from the right-hand side; returns the remainder for the parent. Leaves each freedom's own
+    /// share in its row, or for a root in its rates.
     #[inline]
     fn forward(&self, b: usize, x: &mut [f64], joints_at: usize) -> Wrench {
         let mut p = at(x, 6 * b);
@@ -346,7 +346,7 @@ impl Node {
         wrench_back(&p, &self.shift)
     }
 
-    /// The same, but leaves what each freedom feels in the rates of the body.
+    /// The same, but leaves the load on each freedom in the rates of the body.
     #[inline]
     fn forward_rates(&self, b: usize, x: &mut [f64], joints_at: usize) -> Wrench {
         let Some(joint) = self.joint.filter(|_| self.hangs) else { return self.forward(b, x, joints_at) };
@@ -376,7 +376,7 @@ impl Node {
         let mut impulses = [0.0; 6];
         for (f, felt) in self.freedoms[..self.count].iter().zip(felt).rev() {
             let (left, asked) = (felt - dot(&f.response, &v), rhs[f.row]);
-            // μ = K·(rate − b), without the difference of what may be nearly equal
+            // μ = K·(rate − b), without the difference of nearly equal numbers
             impulses[f.row] = f.stiffness * f.inverse * (left - f.own * asked);
             add(&mut v, (left + f.stiffness * asked) * f.inverse, &f.motion);
         }

@@ -2,7 +2,7 @@
 //!
 //! * [`Tree`] eliminates each body and the joint above it from the leaves to the root in blocks of fixed size:
 //!   O(n), no pivoting, every pivot positive. It serves any number of trees at once.
-//! * [`Cut`] is a row that closes a loop, on up to four bodies; what is left of them is dense and factored by faer.
+//! * [`Cut`] is a row that closes a loop, on up to four bodies; their reduced system is dense and factored by faer.
 //! * [`Path`] answers "how does a wrench on this body move that body" by the path to the root alone, which is all
 //!   that contacts need of the inverse.
 //! * [`Rows`] is the geometry of a joint: six directions, each rigid, compliant or free.

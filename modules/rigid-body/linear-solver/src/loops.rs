@@ -2,14 +2,13 @@
 //!
 //! With K the matrix of the trees, H the rows and C their compliance, W = H·K⁻¹·Hᵀ + C is symmetric and positive
 //! semi-definite. It is scaled to a unit diagonal and factored by Cholesky with diagonal pivoting (faer), which stops
-//! at the numerical rank: a row whose pivot falls below 1e-11 says nothing that the others do not say, gets no
-//! impulse, and is counted. That is what a closed chain with fewer freedoms than rows promise asks for (Bricard's
-//! mechanism has 30 rows for 30 coordinates, and moves).
+//! at the numerical rank: a row whose pivot falls below 1e-11 is redundant, gets no impulse, and is counted. Closed
+//! chains with dependent rows need this (Bricard's mechanism has 30 rows for 30 coordinates, and moves).
 
 use crate::dense::Dense;
 use crate::forest::{Error, Forest};
 use crate::spatial::{Wrench, dot};
-/// A row that moves less than this share of what it would move with its bodies free moves nothing but rounding.
+/// A row whose mobility is less than this share of that with free bodies moves by rounding only.
 const IMMOBILE: f64 = 1e-20;
 /// Bodies that one row can act on.
 pub const MOST_PARTS: usize = 4;
@@ -57,7 +56,7 @@ impl Loops {
         self.cuts.is_empty()
     }
 
-    /// Rows that say nothing new.
+    /// Number of redundant rows.
     pub fn redundant(&self) -> usize {
         self.live - self.w.rank()
     }
@@ -124,7 +123,7 @@ impl Loops {
         }
     }
 
-    /// About what a unit impulse along row i would move if its bodies were free.
+    /// Approximate motion along row i under a unit impulse if its bodies were free.
     fn free_mobility(&self, i: usize, forest: &Forest) -> f64 {
         let part = |(body, w): &(usize, Wrench)| {
             let (force, moment) = w.split_at(3);
@@ -144,7 +143,7 @@ impl Loops {
         pairs.map(|((a, x), (b, y))| sum(forest.shared(a, b), x, y)).sum()
     }
 
-    /// Adds what the rows do to a solution of the trees; `x[n..]` holds their right-hand sides and then impulses.
+    /// Adds the effect of the rows to a solution of the trees; `x[n..]` holds their right-hand sides and then impulses.
     pub fn substitute(&self, x: &mut [f64], n: usize) {
         let (v, rows) = x.split_at_mut(n);
         for (cut, (b, scale)) in self.cuts.iter().zip(rows.iter_mut().zip(&self.scale)) {

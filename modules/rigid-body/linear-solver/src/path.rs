@@ -28,7 +28,7 @@ impl Path {
         tree.loops().feel(tree.forest(), body, path, loops);
     }
 
-    /// ⟨y_a, y_b⟩ over the shared entries: what loops hold back counts against.
+    /// ⟨y_a, y_b⟩ over the shared entries: the part that loops hold back is subtracted.
     pub fn dot(tree: &Tree, shared: usize, a: &[f64], b: &[f64]) -> f64 {
         let loops = tree.loops().len();
         let held: f64 = a[..loops].iter().zip(&b[..loops]).map(|(a, b)| a * b).sum();

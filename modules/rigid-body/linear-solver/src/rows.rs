@@ -1,4 +1,4 @@
-//! The six directions of a joint between two bodies and what rates and impulses along them do.
+//! The six directions of a joint between two bodies and the rates and impulses along them.
 
 use nalgebra::Vector3;
 

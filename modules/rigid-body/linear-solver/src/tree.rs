@@ -88,15 +88,15 @@ impl Tree {
         }
     }
 
-    /// The same without the impulses of rigid rows, which become 0 and which [`Tree::impulses`] tells; for trees without
+    /// The same without the impulses of rigid rows, which become 0; [`Tree::impulses`] computes them. For trees without
     /// loops.
     pub fn substitute_rates(&self, x: &mut [f64]) {
         self.forest.substitute_rates(x);
     }
 
-    /// Writes the impulses of rigid rows into a solution whose rates are known: what a body and all below it get of the
-    /// right-hand side and do not need for their rates, their joint carries. `masses`, `inertia`: as factored; `below`: a
-    /// buffer.
+    /// Writes the impulses of rigid rows into a solution whose rates are known: the joint carries the part of the
+    /// right-hand side of a body and all below it that their rates do not need. `masses`, `inertia`: as factored;
+    /// `below`: a buffer.
     pub fn impulses(
         &self,
         masses: &[f64],
@@ -108,7 +108,7 @@ impl Tree {
         self.forest.impulses(masses, inertia, rhs, x, below);
     }
 
-    /// [`Tree::substitute`] for a right-hand side that is kept; says so when the solution is not finite.
+    /// [`Tree::substitute`] for a right-hand side that is kept; an error if the solution is not finite.
     ///
     /// # Errors
     /// [`Error::NotFinite`].

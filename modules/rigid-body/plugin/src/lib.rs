@@ -1,4 +1,4 @@
-//! The module rigid-body as a dynamic library, and what its section says of it.
+//! The module rigid-body as a dynamic library, with the description in its section.
 terraglue_plugin::export_subsystem! {
     terraglue_rigid_body::RigidBody,
     kind: "robot",

@@ -25,7 +25,7 @@ pub(crate) struct Supply {
     /// Voltage and current of the last step, V and A.
     pub voltage: f64,
     pub current: f64,
-    /// Energy delivered, lost in the internal resistance, and asked for beyond what it can give, J.
+    /// Energy delivered, lost in the internal resistance, and requested beyond its capability, J.
     pub delivered: f64,
     pub lost: f64,
     pub missing: f64,

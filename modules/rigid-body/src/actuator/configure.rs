@@ -8,7 +8,7 @@ use crate::placement::matches;
 use serde_json::Value;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// A drive train with numbers that stand in a public source.
+/// A drive train with numbers from a public source.
 struct Preset {
     name: &'static str,
     kind: Drivetrain,
@@ -105,7 +105,7 @@ pub(crate) fn text<'a>(
         .transpose()
 }
 
-/// The actuator of a joint; `given` holds what the robot file says.
+/// The actuator of a joint; `given` holds the data of the robot file.
 pub(crate) fn actuator(config: &Config, model: &Model, joint: &str, given: Actuator) -> Result<Actuator> {
     let mut actuator = given;
     if let Some(name) = text(config, model, "actuator.preset", joint)? {

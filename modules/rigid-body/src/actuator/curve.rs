@@ -138,7 +138,7 @@ impl Curve {
         self.push(((at_zero + bound) / slope, Tag::Low), Line::level(-bound), Tag::Low);
     }
 
-    /// Becomes another one, of which only what is in use is copied.
+    /// Becomes another one; only the parts in use are copied.
     pub fn assign(&mut self, other: &Self) {
         self.count = other.count;
         self.kinks[..self.count].copy_from_slice(&other.kinks[..self.count]);
@@ -287,7 +287,7 @@ impl Curve {
         }
     }
 
-    /// Impulses just left and just right of a rate: the larger and the smaller of what is possible there.
+    /// Impulses just left and just right of a rate: the largest and the smallest possible there.
     pub fn span(&self, u: f64) -> (f64, f64) {
         let left = self.kinks[..self.count].partition_point(|k| k.0 < u - RATE_TOLERANCE);
         let right = self.kinks[..self.count].partition_point(|k| k.0 <= u + RATE_TOLERANCE);
@@ -356,7 +356,7 @@ impl Curve {
         }
     }
 
-    /// The mode to begin with: what the last one was, nearest to the last rate.
+    /// The mode to begin with: the last one, nearest to the last rate.
     pub fn start(&self, last: Mode, rate: f64) -> Mode {
         let Some(wanted) = last.tag() else { return self.first(rate) };
         let kinks = (0..self.count).filter(|k| self.kinks[*k].1 == wanted && self.is_vertical(*k));

@@ -52,7 +52,7 @@ pub(crate) struct Outcome {
 }
 
 impl Actuator {
-    /// Energies count from here on. What the winding holds counts as drawn, so that giving it back is no gain.
+    /// Energies count from here on. Energy held by the winding counts as drawn, so that giving it back is no gain.
     pub fn restart_ledger(&mut self) {
         let EnergyLedger { power, electrical_power, friction, stop, .. } = self.ledger;
         let electrical = 0.5 * self[Item::Inductance] * self.current * self.current;
@@ -60,7 +60,7 @@ impl Actuator {
             EnergyLedger { power, electrical_power, friction, stop, electrical, ..EnergyLedger::default() };
     }
 
-    /// Advances the actuator by a step of length h at the voltage of the supply; adds to what is drawn from it.
+    /// Advances the actuator by a step of length h at the voltage of the supply; adds to the energy drawn from it.
     pub fn commit(&mut self, o: &Outcome, supply_v: f64, h: f64, draw: &mut Draw) {
         let torque = o.shares.motor / h;
         let work = o.shares.motor * o.mean_rate;

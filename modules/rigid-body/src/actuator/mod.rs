@@ -1,4 +1,4 @@
-//! Actuators: what stands between a command and the torque at a joint, and what it costs.
+//! Actuators: the chain from a command to the torque at a joint, and its energy.
 //!
 //! | file | what |
 //! |---|---|
@@ -7,7 +7,7 @@
 //! | `winding` | DC motor and gear: current, voltage, efficiency both ways |
 //! | `friction` | Coulomb friction that sticks exactly, LuGre friction |
 //! | `thermal` | winding, housing, ambient |
-//! | `battery` | what feeds all motors of a robot |
+//! | `battery` | supply of all motors of a robot |
 //! | `ledger` | power and energy of an actuator |
 //! | `configure` | from the scenario: presets and patterns |
 //!
@@ -50,7 +50,7 @@ impl Drivetrain {
 pub(crate) struct Actuator {
     pub kind: Drivetrain,
     pub settings: [f64; SETTINGS.len()],
-    /// Voltage that is asked for in the mode `voltage`, V.
+    /// Voltage that is commanded in the mode `voltage`, V.
     pub voltage_target: f64,
     /// Winding current and terminal voltage, A and V; of the supply where there is no winding.
     pub current: f64,

@@ -2,7 +2,7 @@
 //!
 //! C_w·dT_w/dt = P − (T_w − T_h)/R_wh, C_h·dT_h/dt = (T_w − T_h)/R_wh − (T_h − T_a)/R_ha (the usual two-body model of
 //! motor catalogues, e.g. maxon, "Motor data and simulation"), by implicit Euler: stable for any step, and the heat
-//! that goes in is the heat that is stored plus what leaves.
+//! that goes in is the heat that is stored plus the heat that leaves.
 
 use super::{Actuator, Item};
 

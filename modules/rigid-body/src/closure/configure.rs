@@ -83,7 +83,7 @@ pub(crate) fn closures(
     Ok(all)
 }
 
-/// A joint that follows another, as the robot file says.
+/// A joint that follows another, as the robot file defines.
 fn from_coupling(c: &import::Coupling, model: &Model) -> Closure {
     let (follower, leader) = (model.joint_of_file(c.follower), model.joint_of_file(c.leader));
     Closure {
@@ -92,7 +92,7 @@ fn from_coupling(c: &import::Coupling, model: &Model) -> Closure {
     }
 }
 
-/// Two bodies held together as they stand, as the robot file says.
+/// Two bodies held together as they stand, as the robot file defines.
 fn from_loop(l: &import::Loop, model: &Model, bodies: &[Motion]) -> Closure {
     let (origin, q) = frame(model, bodies, l.bodies[0]);
     let point = origin + q * l.origin;

@@ -2,7 +2,7 @@
 //!
 //! Each of them is one or more rows on up to four bodies. A row has a value (how far it is open, m or rad; for a
 //! spring its length) and the Jacobian of that value. All values are bilinear in positions and body-fixed directions
-//! or divided by what makes them so, see [`Rows`](terraglue_linear_solver::Rows) and
+//! or divided by a factor that makes them so, see [`Rows`](terraglue_linear_solver::Rows) and
 //! [`mean_rows`](crate::dynamics::joint_rows::mean_rows): with poses at both ends of a step, the Jacobian made of mean
 //! vectors times the mean rates times h is the change of the value.
 

@@ -22,7 +22,7 @@ const FULL_RECOVERY: f64 = 1e-5;
 /// Of more overlap this share is taken out per step, no faster than `RECOVERY_SPEED`, m/s.
 const RECOVERY: f64 = 0.1;
 const RECOVERY_SPEED: f64 = 0.5;
-/// Impacts slower than this many times what gravity gives in a step do not rebound.
+/// Impacts slower than this many times the speed that gravity adds in a step do not rebound.
 const REBOUND: f64 = 4.0;
 /// A contact that moves less than this under a unit impulse cannot be moved, 1/kg.
 const IMMOBILE: f64 = 1e-14;
@@ -74,7 +74,7 @@ pub(crate) struct BodyContacts {
     points: Vec<ContactPoint>,
     /// Per point and component the wrench of a unit impulse on a and on b, about their centres of mass.
     wrenches: Vec<[[[f64; 6]; 2]; 3]>,
-    /// Added to u_n: gap over h, or what a rebound asks for, m/s.
+    /// Added to u_n: gap over h, or the speed of a rebound, m/s.
     offsets: Vec<f64>,
     mu: Vec<f64>,
     impulses: Vec<f64>,

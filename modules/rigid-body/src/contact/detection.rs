@@ -126,7 +126,7 @@ impl Detector {
 
     fn may_meet(&self, model: &Model, bodies: &[Motion], i: usize, k: usize) -> bool {
         let (a, b) = (self.colliders[i].body, self.colliders[k].body);
-        // A body that hangs from the world is no neighbour of what stands in it.
+        // A body that hangs from the world is no neighbour of the shapes that stand in it.
         let neighbours = |a: Option<usize>, b: Option<usize>| {
             let above = a.and_then(|a| model.joint_above[a]).map(|j| model.joints[j].parent);
             b.is_some() && above == Some(b)
@@ -239,7 +239,7 @@ fn between(
     let (pose_a, pose_b) = (a.parry_pose(bodies), b.parry_pose(bodies));
     let PairScratch { manifold, found } = scratch;
     found.clear();
-    // Bodies come before what stands still, so ground is b.
+    // Bodies come before fixed shapes, so ground is b.
     if is_ground(&*b.shape) {
         on_triangles((&*b.shape, &pose_b), (&*a.shape, &pose_a), reach, manifold, &mut |f| found.push(f));
         reduce(found);

@@ -4,8 +4,8 @@
 //! the problem is solved with G + ε·1 and then by proximal steps (gap − ε·T_previous), which lead to the normals of
 //! smallest norm whatever the order of the feet (Rockafellar 1976). Then normals and sticking components
 //! together, starting from there, each port within its friction |T_t| ≤ μ·T_n and, for patches, its moments
-//! within the footprint; what would exceed a bound is put on it. A port that opens because it cannot both stick and
-//! press, and then has to close again, slips.
+//! within the footprint; a component that would exceed a bound is put on it. A port that opens because it cannot both
+//! stick and press, and then has to close again, slips.
 //!
 //! If the block of G in hand is far from singular, the proximal point is its only solution and comes from one
 //! factorisation of G itself; the active normals then come from a few guesses, and Lemke's algorithm solves those that
@@ -23,16 +23,16 @@ use terraglue_subsystem::Port;
 const REGULARISATION: f64 = 1e-4;
 /// Mean diagonal of G (m/N, rad/(N m)) up to which a force moves nothing: guides and velocity motors hold it.
 const IMMOBILE: f64 = 1e-12;
-/// ε there. What a rigid ground and a rigid motor do to each other is unbounded; with this it is a force that
-/// exceeds any motor, so that the motor's bound decides in the next round.
+/// ε there. The force between a rigid ground and a rigid motor is unbounded; with this it exceeds any motor's, so that
+/// the motor's bound decides in the next round.
 const IMMOBILE_REGULARISATION: f64 = 1e-9;
 /// Proximal steps: at least, at most, and the relative change at which they end.
 const PROXIMAL_MIN: usize = 4;
 const PROXIMAL_MAX: usize = 40;
 const PROXIMAL_CHANGE: f64 = 1e-12;
-/// Still so large a share of T in the last proximal step: what is held cannot be held, and T grows with every step.
+/// Still so large a share of T in the last proximal step: the components cannot be held, and T grows with every step.
 const GROWS: f64 = 1e-2;
-/// Relative change at which what slips with its normal force has arrived.
+/// Relative change at which components that slip with their normal force have converged.
 const ARRIVED: f64 = 1e-9;
 /// Pivots of G above this share of its diagonal: the block is solved as it is. Proximal steps lead to the same then.
 const REGULAR: f64 = REGULARISATION;
@@ -40,7 +40,7 @@ const REGULAR: f64 = REGULARISATION;
 const GUESSES: usize = 6;
 /// Rounds in which ports change between open, sticking and slipping.
 const MAX_ROUNDS: usize = 24;
-/// Motion that counts as closing, as a share of what the largest wrench does.
+/// Motion that counts as closing, as a share of the motion under the largest wrench.
 const NOTICED: f64 = 1e-9;
 /// A port that closes again so often within a step goes round in a circle.
 const MOST_CLOSINGS: u32 = 4;
@@ -107,7 +107,7 @@ fn unilateral(port: &Port) -> bool {
 }
 
 impl Estimator {
-    /// Solves for T*; `Err` tells why there is none. Returns whether the normals are unique.
+    /// Solves for T*; `Err` has the reason why there is none. Returns whether the normals are unique.
     pub fn solve(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
         t.fill(0.0);
         self.classify(p);
@@ -262,8 +262,8 @@ impl Estimator {
         rank(m, &mut self.matrix, 1e-9) == m
     }
 
-    /// Motion of all held components equals the partner's; the proximal point nearest to the present T. What slips goes
-    /// with the normal force of its port where that can be solved, and stays as it is otherwise. False: there is none.
+    /// Motion of all held components equals the partner's; the proximal point nearest to the present T. Slipping
+    /// components follow the normal force of their port where that can be solved, else stay. False: there is none.
     fn solve_held(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
         let n = p.gap.len();
         self.unknowns.clear();
@@ -301,7 +301,7 @@ impl Estimator {
         !self.unknowns.iter().any(|i| self.epsilon[*i] == IMMOBILE_REGULARISATION)
     }
 
-    /// Factorises what slips with its normal force: as it is (true), or with ε; none where it is singular.
+    /// Factorises the system with slip that follows the normals: as it is (true), or with ε; none where it is singular.
     fn factor_slipping(&mut self, p: &Problem) -> Option<bool> {
         let (n, m) = (p.gap.len(), self.unknowns.len());
         if self.mobile() {
@@ -317,7 +317,7 @@ impl Estimator {
         lu(m, &mut self.matrix, &mut self.order).then_some(false)
     }
 
-    /// Lists what slips in proportion to a normal force that is unknown: component, unknown, ratio.
+    /// Lists the components that slip in proportion to an unknown normal force: component, unknown, ratio.
     fn follow_normals(&mut self, p: &Problem, t: &[f64]) {
         self.slipping.clear();
         for port in p.ports.iter().filter(|port| unilateral(port)) {
@@ -331,7 +331,7 @@ impl Estimator {
         }
     }
 
-    /// G of the unknowns, or G + ε, with what slips along.
+    /// G of the unknowns, or G + ε, with the slipping components.
     fn fill_matrix(&mut self, p: &Problem, regularised: bool) {
         let (n, m) = (p.gap.len(), self.unknowns.len());
         self.matrix.clear();
@@ -367,7 +367,7 @@ impl Estimator {
             self.slipping.iter().for_each(|(i, normal, ratio)| t[*i] = ratio * t[self.unknowns[*normal]]);
             change = largest(self.rhs.iter().copied());
             size = largest(t.iter().copied());
-            // what rigid motors hold alone grows until their bounds decide in the next round
+            // components that rigid motors alone hold grow until the motors' bounds decide in the next round
             let mobile = |(k, _): &(usize, &f64)| self.epsilon[self.unknowns[*k]] != IMMOBILE_REGULARISATION;
             let growth = largest(self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
             converged = growth <= GROWS * size;
@@ -461,7 +461,7 @@ fn bounds(port: &Port, t: &[f64]) -> [(u32, f64); 4] {
     ]
 }
 
-/// Sweeps over the ports from the present T: each component on its own, then what has a bound within it.
+/// Sweeps over the ports from the present T: each component on its own, then clipped to its bound.
 fn sweep(p: &Problem, t: &mut [f64]) {
     for _ in 0..SWEEPS {
         let (mut change, mut size) = (0.0_f64, 0.0_f64);

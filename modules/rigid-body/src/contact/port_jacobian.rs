@@ -1,6 +1,6 @@
-//! dX, dV and dA/d(wrench on itself) of a trial at ports of glued joints, as exact as its Newton iteration wants them.
+//! dX, dV and dA/d(wrench on itself) of a trial at ports of glued joints, as exact as its Newton iteration needs them.
 //!
-//! Contacts alone take [`Ports::compliance`] instead: their soils bend far more within a step than what that leaves out.
+//! Contacts alone take [`Ports::compliance`] instead: their soils deflect far more than the terms left out.
 
 use super::ports::{Ports, response};
 use crate::dynamics::Dynamics;
@@ -10,7 +10,7 @@ use terraglue_subsystem::{Level, Port, Response};
 /// Bodies that end this near to where they ended before have the same derivatives, m or rad.
 const NEAR: f64 = 1e-5;
 
-/// The derivatives and what they belong to.
+/// The derivatives and the factorisation they belong to.
 #[derive(Default)]
 pub(crate) struct PortJacobian {
     matrices: [Vec<f64>; 3],

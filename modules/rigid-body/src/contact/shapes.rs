@@ -47,7 +47,7 @@ fn height_field(h: &Heights) -> SharedShape {
     SharedShape::new(HeightField::with_flags(heights, scale, HeightFieldFlags::FIX_INTERNAL_EDGES))
 }
 
-/// Pose of the parry shape in the body frame: what stands along z turns from y to z.
+/// Pose of the parry shape in the body frame: a shape along z turns from y to z.
 pub(crate) fn parry_local(shape: &Shape) -> Isometry3<f64> {
     match shape.geometry {
         ShapeGeometry::Cylinder { .. } | ShapeGeometry::Capsule { .. } | ShapeGeometry::Heights(_) => {

@@ -6,11 +6,11 @@ use crate::placement::matches;
 use serde_json::Value;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// Name of what stands still.
+/// Name of everything that stands still.
 const GROUND: &str = "ground";
 /// Pattern of all pairs.
 const ALL: &str = "*";
-/// A parameter: name, value where a scenario is silent, largest value, help.
+/// A parameter: name, default, largest value, help.
 type SurfaceParameter = (&'static str, f64, f64, &'static str);
 
 const FRICTION: SurfaceParameter =
@@ -28,10 +28,10 @@ pub(crate) struct Pair {
 /// Friction and restitution of all pairs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surfaces {
-    /// Of pairs that nothing else is said of: by the scenario, and friction not by the robot file either.
+    /// Of pairs without numbers of their own in the scenario or, for friction, in the robot file.
     pub friction: f64,
     pub restitution: f64,
-    /// By both bodies, what stands still last; empty where no pair has numbers of its own.
+    /// By both bodies, fixed shapes last; empty where no pair has numbers of its own.
     pairs: Vec<Pair>,
     bodies: usize,
 }
@@ -83,7 +83,7 @@ impl PairPattern<'_> {
         matches(p, a) && matches(q, b) || matches(p, b) && matches(q, a)
     }
 
-    /// Names that are written out, then the length of the patterns: what says more of a pair goes first.
+    /// Names that are written out, then the length of the patterns: the more specific pattern goes first.
     fn rank(&self) -> (usize, usize) {
         let plain = self.names.iter().filter(|p| !p.contains('*')).count();
         (plain, self.names.iter().map(|p| p.len()).sum())

@@ -1,7 +1,7 @@
 //! Ground of triangles that stands still, a mesh or a height field: the contact points of a convex shape on it.
 //!
 //! Each triangle near the shape gives the points of a convex pair. At edges inside a surface the normal is kept
-//! within those of both neighbours (parry's pseudo-normals), so that what slides over a flat mesh meets no edges.
+//! within those of both neighbours (parry's pseudo-normals), so that bodies sliding over a flat mesh meet no edges.
 
 use crate::contact::convex::{Manifold, between_convex, vector};
 use crate::contact::reduce::Found;

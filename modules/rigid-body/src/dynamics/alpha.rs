@@ -103,8 +103,8 @@ impl Dynamics {
     }
 }
 
-/// Takes from the right-hand side what opens of joints and loops when all bodies go on at their rates for a moment, forwards and
-/// backwards.
+/// Takes from the right-hand side the opening of joints and loops when all bodies go on at their rates for a moment, forwards
+/// and backwards.
 fn drift(dynamics: &mut Dynamics, state: &State) {
     for dt in [START_DIFFERENCE_S, -START_DIFFERENCE_S] {
         for (end, m) in dynamics.trial.ends.iter_mut().zip(&state.bodies) {

@@ -2,9 +2,9 @@
 //!
 //! Corrections with a factor that stands are x ← x + f(x). Next to a singular pose the rows of the factor and those
 //! of the end of the step differ so much that they diverge along the few directions that become singular there: the
-//! midpoint rule pushes along mean rows, which turn their sign while bodies pass a pose in line. Taking out what the last
-//! corrections tell of these directions, x ← x + f − (ΔX + ΔF)·γ with γ = argmin |f − ΔF·γ| (Anderson 1965; for linear
-//! problems this is GMRES, Walker and Ni 2011), brings them back without a derivative.
+//! midpoint rule pushes along mean rows, which turn their sign while bodies pass a pose in line. Taking out these
+//! directions as the last corrections show them, x ← x + f − (ΔX + ΔF)·γ with γ = argmin |f − ΔF·γ| (Anderson 1965; for
+//! linear problems this is GMRES, Walker and Ni 2011), brings them back without a derivative.
 
 use terraglue_numerics::in_place::{cholesky, cholesky_solve};
 
@@ -62,7 +62,7 @@ impl Anderson {
         }
     }
 
-    /// γ of the last m differences; false: they tell nothing.
+    /// γ of the last m differences; false: they are degenerate.
     fn fit(&mut self, m: usize) -> bool {
         let n = self.rates;
         let dot = |a: &[f64], b: &[f64]| a[..n].iter().zip(&b[..n]).map(|(a, b)| a * b).sum::<f64>();

@@ -17,7 +17,7 @@ use crate::motion::Motion;
 use crate::state::State;
 use terraglue_linear_solver::Cut;
 
-/// Rows of all connections and what the step knows of them.
+/// Rows of all connections and their data in the step.
 #[derive(Default)]
 pub(crate) struct Closing {
     /// First row of each connection, and the end.
@@ -68,8 +68,8 @@ impl Closing {
         self.len() > 0
     }
 
-    /// Takes over what is broken; rows and values at the start of the step; linearised at `ends`. `rule`: length of the step
-    /// and how it is made.
+    /// Takes over which connections are broken; rows and values at the start of the step; linearised at `ends`. `rule`:
+    /// length of the step and how it is made.
     pub fn prepare(
         &mut self,
         model: &Model,
@@ -131,7 +131,7 @@ impl Closing {
         }
     }
 
-    /// Writes what is left open at `ends` into `correction`; the worst connection and by how much.
+    /// Writes the remaining gaps at `ends` into `correction`; the worst connection and by how much.
     pub fn open_into(
         &mut self,
         model: &Model,
@@ -157,7 +157,7 @@ impl Closing {
         worst
     }
 
-    /// Adds the impulses of all rows of the trial and what is missing to their laws to `correction`.
+    /// Adds the impulses of all rows of the trial and the residuals of their laws to `correction`.
     pub fn miss_into(
         &mut self,
         model: &Model,
@@ -225,7 +225,7 @@ impl Closing {
         }
     }
 
-    /// Takes what opens at `ends` within a moment dt from the right-hand side of the accelerations.
+    /// Takes the opening at `ends` within a moment dt from the right-hand side of the accelerations.
     pub fn drift_into(
         &mut self,
         model: &Model,

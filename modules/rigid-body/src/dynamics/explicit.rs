@@ -22,7 +22,7 @@ fn weight(j: &JointState, h: f64) -> f64 {
 
 /// The gains of explicit motors that were checked last.
 pub(crate) struct ExplicitGains {
-    /// Per joint what its motor weighs; 0: it is none.
+    /// Weight of the motor of each joint; 0: no motor.
     weights: Vec<f64>,
 }
 

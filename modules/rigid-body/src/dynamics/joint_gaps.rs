@@ -5,10 +5,10 @@ use crate::dynamics::joint_rows::gap;
 
 /// Joints are closed to this at the end of every step, m and rad.
 const GAP_TOLERANCE: f64 = 1e-11;
-/// Above this a step is refused, m and rad; below, what does not shrink is rounding.
+/// Above this a step is refused, m and rad; below, a gap that does not shrink is rounding.
 const GAP_REFUSED: f64 = 1e3 * GAP_TOLERANCE;
 /// Most corrections per solve. Two or three are usual; each leaves about a share of the angle by which bodies turn in
-/// the step, times the square root of what they weigh in each other's terms, and after an impact that is not small.
+/// the step, times the square root of their mass ratio, and after an impact that is not small.
 const MAX_CORRECTIONS: usize = 60;
 /// Corrections go on plainly as long as one leaves less than this share of the gap before it …
 const CLOSES: f64 = 0.9;
@@ -18,7 +18,7 @@ const PLAIN: usize = 8;
 const STEPS_WITHOUT_PROGRESS: usize = 6;
 
 impl Dynamics {
-    /// Takes out what is left of the joints' gaps at the end of the step.
+    /// Removes the remaining gaps of the joints at the end of the step.
     pub(super) fn close_joints(&mut self) -> Result<(), Failure> {
         let (mut least, mut since, mut mixed) = (f64::INFINITY, 0, None);
         for round in 0..MAX_CORRECTIONS {
@@ -56,9 +56,9 @@ impl Dynamics {
         self.check_gaps()
     }
 
-    /// Whether what the correction leaves open is surely below the tolerance, so that it need not be measured: rows are
-    /// those of the start, which bodies turn by θ in the step, and the correction itself turns them a little more. Where it
-    /// moves bodies by up to m along each axis (m, rad), joints are left open by at most 2(θ + m)·2√3·m(1 + arm).
+    /// Whether the gaps that the correction leaves are surely below the tolerance, so that it need not be measured: rows
+    /// are those of the start, which bodies turn by θ in the step, and the correction itself turns them a little more.
+    /// Where it moves bodies by up to m along each axis (m, rad), joints are left open by at most 2(θ + m)·2√3·m(1 + arm).
     fn surely_closes(&self) -> bool {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let moved = 2.0 * self.h * largest(&self.correction[..6 * self.trial.ends.len()]);

@@ -1,4 +1,4 @@
-//! The matrix [[M, Jᵀ], [J, −C]] of the whole robot: numbering of its unknowns, what it is made of, and its factor.
+//! The matrix [[M, Jᵀ], [J, −C]] of the whole robot: numbering of its unknowns, assembly, and its factor.
 
 use super::scheme::Six;
 use crate::joint::Joint;
@@ -20,7 +20,7 @@ pub(crate) struct Kkt {
     pub(super) compliance: Vec<[Option<f64>; 6]>,
     /// Whether the factor stands for the step and its branches.
     pub(super) factored: bool,
-    /// Counts factorisations; tells whether a compliance matrix is still valid.
+    /// Counts factorisations; shows whether a compliance matrix is still valid.
     pub factor_count: u64,
     below: Vec<[f64; 6]>,
 }

@@ -7,7 +7,7 @@
 //! (Ryckaert, Ciccotti and Berendsen 1977), symplectic (Leimkuhler and Skeel 1994): joints neither open nor
 //! brake. Rotation: the angular momentum is updated by the impulses, orientation by the Cayley transform of the
 //! midpoint rate, see [`gyro`]. The second-order options are
-//! [`alpha`] and [`midpoint`] over [`second_order`]; what all share is in [`scheme`].
+//! [`alpha`] and [`midpoint`] over [`second_order`]; their common part is in [`scheme`].
 
 mod alpha;
 mod anderson;
@@ -108,7 +108,7 @@ pub(crate) struct Dynamics {
     /// From a centre of mass to a joint at most, m; infinite where that does not bound how rows turn.
     longest_arm: f64,
     base_rhs: Vec<f64>,
-    /// Whether trials leave out what the commit alone asks for (see [`Dynamics::complete`]).
+    /// Whether trials leave out results that only the commit needs (see [`Dynamics::complete`]).
     lean: bool,
     /// External impulses of the trial, laid out as the unknowns.
     pub external: Vec<f64>,
@@ -274,8 +274,8 @@ impl Dynamics {
         }
     }
 
-    /// Work of the contact impulses of the trial: at the mean of the rates before and after, so that it is exactly
-    /// what the kinetic energy misses.
+    /// Work of the contact impulses of the trial: at the mean of the rates before and after, so that it is exactly the
+    /// change of the kinetic energy.
     pub fn contact_work(&self) -> f64 {
         let at = |v| self.contacts.work(&self.kkt.body_at, v);
         0.5 * (at(&self.start.free) + at(&self.trial.solution))
@@ -296,7 +296,7 @@ impl Dynamics {
         self.kkt.factor(&self.closing.cuts)?;
         self.kkt.factored = true;
         self.kkt.factor_count += 1;
-        // Rigid rows along axes are asked for their impulses by every trial.
+        // Every trial needs the impulses of rigid rows along axes.
         let rigid =
             |(joint, c): (&Joint, &[Option<f64>; 6])| joint.free_row().is_some_and(|r| c[r] == Some(0.0));
         self.lean = self.is_plain() && !self.model.joints.iter().zip(&self.kkt.compliance).any(rigid);
@@ -347,7 +347,7 @@ impl Dynamics {
         Err(Failure::Branches { rounds })
     }
 
-    /// Like [`Dynamics::solve`] where nothing but the branches of the axes is asked for: where the present ones hold, the
+    /// Like [`Dynamics::solve`] where only the branches of the axes are needed: where the present ones hold, the
     /// joints are not closed to the last, and the ends of the trial stay as they were.
     pub fn find_branches(&mut self) -> Result<(), Failure> {
         if self.is_plain() {
@@ -360,7 +360,7 @@ impl Dynamics {
         self.solve()
     }
 
-    /// The step on the present branches, but for what it leaves open of the joints.
+    /// The step on the present branches, without closing the remaining gaps of the joints.
     fn solve_branch(&mut self) -> Result<(), Failure> {
         self.assemble();
         if self.lean {

@@ -19,7 +19,7 @@ pub(crate) type Six = [f64; 6];
 /// The rule by which a step is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Integrator {
-    /// First order in rates; impulses are what they are. For impacts.
+    /// First order in rates; impulses act directly. For impacts.
     SymplecticEuler,
     /// Second order; needs forces that change smoothly.
     GeneralizedAlpha(Weights),
@@ -30,7 +30,7 @@ pub(crate) enum Integrator {
 impl Integrator {
     pub const NAMES: [&'static str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
 
-    /// θ: what a force of the step weighs in the system for u.
+    /// θ: the weight of a force of the step in the system for u.
     pub fn force_weight(&self) -> f64 {
         match self {
             Self::SymplecticEuler => 1.0,

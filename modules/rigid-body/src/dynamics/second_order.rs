@@ -1,7 +1,7 @@
 //! Common parts of the second-order options: Newton on equilibrium and joints for the mean rates of the step.
 //!
-//! The matrix is the factor of the step, M and the rows J taken at the predicted motion; residuals are exact, so what
-//! the matrix leaves out (gyroscopic terms, turning of the rows under load) costs iterations, not accuracy. Joints
+//! The matrix is the factor of the step, M and the rows J taken at the predicted motion; residuals are exact, so terms
+//! that the matrix leaves out (gyroscopic terms, turning of the rows under load) cost iterations, not accuracy. Joints
 //! are closed on the level of positions. The two rules are [`super::alpha`] and [`super::midpoint`].
 
 use super::scheme::{Integrator, Six, Weights, rates};
@@ -18,7 +18,7 @@ const PLAIN: usize = 8;
 const STALLED: f64 = 1e-7;
 /// Corrections end when the rates change by less than this, relative to the largest.
 const RATE_CHANGE: f64 = 1e-11;
-/// Nor can they be known better than the gaps of joints can be told: this many units in the last place, over h.
+/// Nor can they be more accurate than the gaps of joints: this many units in the last place, over h.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Rates below this are rest, m/s and rad/s.
 const REST: f64 = 1e-14;
@@ -123,7 +123,7 @@ impl Dynamics {
         }
     }
 
-    /// Fills `correction` with what is missing to equilibrium at the end and to closed joints.
+    /// Fills `correction` with the residuals of equilibrium at the end and of closed joints.
     pub(super) fn residual_second_order(&mut self) {
         let weight = self.integrator.force_weight();
         let midpoint = self.integrator == Integrator::EnergyMomentum;
@@ -177,7 +177,7 @@ impl Dynamics {
     }
 }
 
-/// To what rates of jointed bodies can be told, m/s and rad/s.
+/// Accuracy of the rates of jointed bodies, m/s and rad/s.
 fn noise(dynamics: &Dynamics) -> f64 {
     let jointed = dynamics.model.joints.iter().flat_map(|j| [Some(j.child), j.parent]).flatten();
     let looped = (0..dynamics.start.bodies.len()).filter(|_| dynamics.closing.any());

@@ -4,8 +4,8 @@
 //! mean. The derivative of a trial asks for the rows of the conditions where the bodies ended, under the derivative of
 //! the Cayley transform, and in second order also for gyroscopic moments and for forces that turn with their joints: all
 //! that is of the order ω·h, and all of it is in the residual r of the step. For a load f the change y of the unknowns
-//! is refined with the factor at hand, y ← y + P⁻¹(f + (r(s + ε·y) − r(s))/ε), each time to about ω·h of what was
-//! left, until that is [`EXACT`].
+//! is refined with the factor at hand, y ← y + P⁻¹(f + (r(s + ε·y) − r(s))/ε), each time to about ω·h of the previous
+//! error, until that is [`EXACT`].
 
 use super::Dynamics;
 
@@ -61,7 +61,7 @@ impl Sensitivity {
             }
             dynamics.kkt.solver.substitute(&mut dynamics.correction);
             let now = largest(&dynamics.correction[..rates]) / largest(&self.change[..rates]);
-            // A step that turns bodies so far that this does not end keeps what it has.
+            // A step that turns bodies so far that this does not converge keeps the last value.
             if !(now < left) {
                 break;
             }

@@ -11,7 +11,7 @@ use crate::state::{Load, State};
 /// The start of a step.
 pub(crate) struct StepStart {
     pub bodies: Vec<Motion>,
-    /// Accelerations and what else the second-order options read of the state.
+    /// Accelerations and other data that the second-order options read from the state.
     pub accelerations: Vec<Acceleration>,
     pub(super) angles: Vec<f64>,
     pub(super) loads: Vec<Load>,
@@ -51,7 +51,7 @@ impl StepStart {
         self.free_rate[b] = cayley(&(h * self.middle_rate[b])) * (m.q * end);
     }
 
-    /// The force-free motion of first order: rates as they are, turned as free rotation says; `body_at`: unknowns of the bodies.
+    /// The force-free motion of first order: rates as they are, turned as in free rotation; `body_at`: unknowns of the bodies.
     pub fn go_on_freely(&mut self, body_at: &[usize]) {
         for (b, at) in body_at.iter().enumerate() {
             self.free[*at..at + 3].copy_from_slice(self.bodies[b].v.as_slice());

@@ -8,8 +8,8 @@
 use super::{Dynamics, Failure};
 use crate::math::V3;
 
-/// Tells of a joint that stays open whether the step is beyond that limit; the solution of the trial is the step on its branches
-/// before joints are closed.
+/// Determines for a joint that stays open whether the step is beyond that limit; the solution of the trial is the step on its
+/// branches before joints are closed.
 pub(super) fn explained(dynamics: &Dynamics, failure: Failure) -> Failure {
     let Failure::Gap { joint, gap } = failure else { return failure };
     let load = |b: usize| load_of(dynamics, b);

@@ -2,7 +2,7 @@
 //!
 //! A node's next change is a function of the heights around it: the eight neighbours for the rule of repose, the
 //! ends of triples two nodes away as well for the rule of curvature. A node sleeps for a rule when nothing there has
-//! changed since the rule visited it; sweeping the active nodes gives what sweeping the whole field would give.
+//! changed since the rule visited it; sweeping the active nodes gives the result of sweeping the whole field.
 
 use terraglue_ground::{Lattice, TILE_EDGE};
 

@@ -12,16 +12,16 @@ use terraglue_soil_contact::{Covered, Ground, Material};
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Config, Error, Host, Result, Variable};
 
-/// κ_max where a scenario is silent, 1/m: a ridge rounded at 2.5 cm.
+/// Default of κ_max, 1/m: a ridge rounded at 2.5 cm.
 pub const DEFAULT_CURVATURE: f64 = 40.0;
-/// Share of the pressed volume that becomes denser where a scenario is silent: 1 − D_r. Loose soil (D_r = 0) gives way by
-/// compaction alone, dense soil (D_r = 1) is pushed aside whole (Vesić 1973, general and punching shear failure). The
-/// relative density of the upper 15 cm of lunar soil is 65 % (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table 9.5).
+/// Default share of the pressed volume that becomes denser: 1 − D_r. Loose soil (D_r = 0) gives way by compaction alone, dense
+/// soil (D_r = 1) is pushed aside whole (Vesić 1973, general and punching shear failure). The relative density of the upper 15
+/// cm of lunar soil is 65 % (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table 9.5).
 pub const DEFAULT_COMPACTION: f64 = 0.35;
 /// Height of a slide of which nothing is known yet, m.
 const FIRST_SLIDE: f64 = 0.1;
 
-/// Sweeps before the first step at most; what is not at rest then goes on in the run.
+/// Sweeps before the first step at most; material not at rest then goes on in the run.
 const MOST_SWEEPS: u32 = 100_000;
 
 /// Parameters of the automaton.
@@ -155,8 +155,8 @@ impl Automaton {
         self.weight = 0.5 * parameters.weight() * cell * cell;
     }
 
-    /// Moves what the feet have pressed out of their nodes to free ones, as far as the sum of the squares of the heights may grow
-    /// by `most`: what does not go in this step waits in its node. Returns by how much it has grown.
+    /// Moves the material pressed out by feet to free nodes, as far as the sum of the squares of the heights may grow by `most`:
+    /// the rest waits in its node. Returns by how much it has grown.
     fn displace(&mut self, ground: &mut Ground, covered: &[Covered], most: f64) -> f64 {
         let mut lifted = 0.0;
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
@@ -204,9 +204,9 @@ impl Automaton {
         self.sweeper.counts.lifted
     }
 
-    /// A front passes a node in Δ/√(g·h'), h' the height of what slides: no slide is faster than a wave on shallow water
-    /// (Savage and Hutter 1989). What a step leaves of the time counts for the next, so that halving the step does not
-    /// double the slides.
+    /// A front passes a node in Δ/√(g·h'), h' the height of the sliding material: no slide is faster than a wave on
+    /// shallow water (Savage and Hutter 1989). Time that a step leaves counts for the next, so that halving the
+    /// step does not double the slides.
     fn slide_freely(&mut self, ground: &mut Ground, h: f64) {
         self.credit += h;
         self.sweeper.wake_changed();

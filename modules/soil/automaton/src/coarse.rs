@@ -1,11 +1,11 @@
 //! Long slopes come to rest first on a lattice of twice the spacing, then on their own.
 //!
 //! Near rest the rule of repose is a diffusion: a slope of n nodes takes about n² sweeps. On blocks of 2 × 2 nodes it
-//! takes a quarter of them, each over a quarter of the nodes. What a block gains is spread over its nodes and those
+//! takes a quarter of them, each over a quarter of the nodes. The gain of a block is spread over its nodes and those
 //! around them, in whole units, so nothing is lost. Material that has slid too far never climbs back, so the coarse
 //! lattice must not flatten: there a slope rests when it is still [`STEEPER`] times as steep, and the rest is left to
 //! the fine rule. With the same threshold on both the cone of a column has flanks of 34.4 to 35.1 degrees instead of
-//! 35.03 to 35.08; with this one it cannot be told from that of the fine rule alone.
+//! 35.03 to 35.08; with this one it is indistinguishable from that of the fine rule alone.
 
 use crate::sweep::Sweeper;
 use terraglue_ground::{Lattice, UNIT_M};
@@ -97,7 +97,7 @@ fn spread(change: i32, lattice: &Lattice, [a, b]: [i32; 2], mut add: impl FnMut(
         }
     }
     for k in 0..4 {
-        // what does not divide by four goes to the first nodes
+        // the remainder of a division by four goes to the first nodes
         let share = own.div_euclid(4) + i64::from(own.rem_euclid(4) > i64::from(k));
         add(2 * a + k % 2, 2 * b + k / 2, share as i32);
     }

@@ -4,7 +4,7 @@ use terraglue_ground::{Lattice, TileMap, TileMapSnapshot, UNIT_M};
 
 /// Content of a node is kept in grains of so many units of height (7.6 µm): 16 bits reach to 0.5 m.
 const GRAIN: i32 = 32;
-/// Tiles that can be touched before memory is asked for again.
+/// Tiles that can be touched before memory is allocated again.
 const RESERVE_TILES: usize = 256;
 
 /// Compacted material by node.
@@ -30,7 +30,7 @@ pub struct SavedCompaction {
 }
 
 impl Compaction {
-    /// None so far; `fraction` (0 … 1) of what is pressed out of a node stays in it, denser.
+    /// None so far; `fraction` (0 … 1) of the material pressed out of a node stays in it, denser.
     pub fn new(lattice: Lattice, fraction: f64) -> Self {
         let grains = TileMap::new(lattice, 0, RESERVE_TILES);
         Self { fraction, grains, carried: 0.0, unplaced: 0, total: 0 }

@@ -2,8 +2,8 @@
 //!
 //! For three nodes a–0–b in a row at the distance d, in four directions: with c = h_a − 2h_0 + h_b and e = (|c| − κ_max·d²)₊,
 //! the flux e/24 rounded down to whole units goes from the middle to each end (c < 0), or from each end to the middle (c > 0)
-//! (Rossmann, Jung and Rast 2010, section IV). e/6 would repair a single triple exactly; 1/24 is what twelve overlapping ones
-//! admit.
+//! (Rossmann, Jung and Rast 2010, section IV). e/6 would repair a single triple exactly; 1/24 is the limit for twelve
+//! overlapping ones.
 
 use crate::lanes::{LANES, lanes, whole};
 use crate::span::Span;
@@ -53,8 +53,8 @@ pub fn triples(
     any
 }
 
-/// Cuts what the middles of triples receive to what every node of a triple admits: its middle and both its `ends`
-/// (inlets; slices of the same length).
+/// Limits the flux to the middles of triples to the inlets of every node of a triple: its middle and both its `ends`
+/// (slices of the same length).
 #[inline(always)]
 pub fn admit_triples(flux: &mut [i32], middle: &[i32], ends: [&[i32]; 2]) {
     for (((q, m), a), b) in flux.iter_mut().zip(middle).zip(ends[0]).zip(ends[1]) {
@@ -89,8 +89,8 @@ pub fn sum_triples(span: Span, y: usize, any: [bool; 3], fluxes: &[Vec<i32>], ch
     }
 }
 
-/// Subtracts what the ends in a row give to middles in a row beside it; `shift` leads from an end to the middles of
-/// the two diagonals.
+/// Subtracts the fluxes from the ends in a row to middles in an adjacent row; `shift` leads from an end to the middles
+/// of the two diagonals.
 #[inline(always)]
 fn take_ends(change: &mut [i32], span: Span, fluxes: &[Vec<i32>], shift: [isize; 2]) {
     let [_, v, d, e] = fluxes else { return };

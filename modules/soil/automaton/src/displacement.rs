@@ -1,4 +1,4 @@
-//! Displacement: what a foot presses out of a node is compacted in part; the rest flows to the ring around the foot, to where the
+//! Displacement: soil pressed out of a node is compacted in part; the rest flows to the ring around the foot, to where the
 //! pressure falls and where the underside drags it (the flow zones below a rim, Wong 1967), trench and rims by conservation.
 
 use crate::active::Marks;
@@ -42,7 +42,7 @@ pub struct Site<'a> {
 impl Site<'_> {
     /// Takes `excess` units out of the loaded node (i, j): its compacted part, and the rest to the nearest nodes without
     /// a foot in eight directions d, weighted with (1 + flow·d)₊/distance². Returns how many units were moved; those without a
-    /// place, and those whose lifting is not paid for yet, stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
+    /// place, and those whose lifting is not paid for yet, stay and are tried again at the next commit. `turn` rotates the direction that gets the remainder.
     pub fn displace(&mut self, [i, j]: [i32; 2], excess: i32, flow: [f64; 2], turn: u32) -> i32 {
         let mut places = [None; 8];
         let mut sum = 0.0;
@@ -80,7 +80,7 @@ impl Site<'_> {
         if gone > 0 {
             self.ground.heights.add_units(i, j, -gone);
             self.changed.mark([i, j]);
-            // what becomes denser stays at its height
+            // compacted material stays at its height
             let all = squares_grown(self.ground.heights.units(i, j), -gone);
             self.lifted += all - all / i64::from(gone) * i64::from(dense);
         }
@@ -97,7 +97,7 @@ impl Site<'_> {
             higher += share * f64::from(heights.units(*a, *b) - heights.units(i, j));
             spread += share * share;
         }
-        // what becomes denser is not lifted: spread·n² + 2·higher·n = most of the rest
+        // compacted material is not lifted: spread·n² + 2·higher·n = most of the rest
         let most = self.most.max(0.0) / (1.0 - self.compaction.fraction()).max(f64::MIN_POSITIVE);
         (((higher * higher + spread * most).sqrt() - higher) / spread) as i32
     }

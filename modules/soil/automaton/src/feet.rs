@@ -1,4 +1,4 @@
-//! The nodes below feet: their load, what still fits under them, and which of them have changed.
+//! The nodes below feet: their load, the room left under them, and which of them have changed.
 
 use crate::active::Marks;
 use std::cmp::Ordering;
@@ -9,7 +9,7 @@ use terraglue_soil_contact::{Covered, Ground};
 pub const OPEN: i32 = i32::MAX;
 /// Inlet of a node with open sky, units.
 pub const OPEN_INLET: i32 = OPEN / 16;
-/// Load and room change in steps of so many units (61 µm), so that a foot at rest wakes nobody.
+/// Load and room change in steps of so many units (61 µm), so that a foot at rest wakes no node.
 const QUANTUM: i32 = 256;
 
 /// Largest flux over one of up to sixteen paths into a node in one pass, units.
@@ -163,10 +163,10 @@ fn put(covered: &mut [[u32; TILE_EDGE as usize]], lattice: &Lattice, node: [i32;
     *row = if set { *row | bit } else { *row & !bit };
 }
 
-/// Runs for which memory is asked at the start.
+/// Runs for which memory is allocated at the start.
 const RUNS: usize = 64;
 
-/// Sorts a list of a few runs that are in order: every foot tells its nodes by rows.
+/// Sorts a list of a few runs that are in order: every foot lists its nodes by rows.
 #[derive(Clone, Debug)]
 struct Runs {
     merged: Vec<Foot>,

@@ -1,7 +1,7 @@
 //! Loose material on a height field as a cellular automaton: angle of repose, curvature, displacement, compaction.
 //!
 //! Each rule is in the file of its name: `repose.rs`, `curvature.rs`, `displacement.rs`, `compaction.rs`; which steep slopes stand
-//! by cohesion is in `standing.rs`, what a foot weighs in `feet.rs`, and `sweep.rs` applies the rules to the active nodes.
+//! by cohesion is in `standing.rs`, the load of a foot in `feet.rs`, and `sweep.rs` applies the rules to the active nodes.
 //!
 //! A cellular automaton moves material between the nodes of the height field in whole units of fixed point, so that
 //! nothing is lost; the forces on a foot come from the pressure and shear laws that all soils share
@@ -12,18 +12,18 @@
 //!   q = trunc(¼·(g − Δ·tan φ_r)₊·g_n/g). A plane of slope tan φ_r is at rest at any azimuth.
 //! * **Curvature**, per triple a–0–b of opposing neighbours in four directions at distance d: with
 //!   c = h_a − 2h_0 + h_b and e = (|c| − κ_max·d²)₊, q = trunc(e/24) goes from 0 to each end (c < 0), or from each
-//!   end to 0 (c > 0). e/6 would repair a single triple exactly; 1/24 is what twelve overlapping ones admit.
+//!   end to 0 (c > 0). e/6 would repair a single triple exactly; 1/24 is the limit for twelve overlapping ones.
 //!
 //! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen. A flux is rounded down
-//! to whole units (0.24 µm). A sweep applies repose, every second one curvature as well; sweeps per step are bounded, what is
-//! not at rest then goes on in the next step.
+//! to whole units (0.24 µm). A sweep applies repose, every second one curvature as well; sweeps per step are bounded, and
+//! material not at rest then goes on in the next step.
 //!
 //! # Load
 //! A pressure p weighs as much as p/(N·ρ·g) of soil, N(z, b) = p_law(z, b)/(ρ·g·z): the force-equivalent height
-//! is z·p/p_law(z), so a node at the depth that the law asks for stands at its reference level and is in
-//! balance with the ground around it. Pressed deeper, it is too high by what it was pressed: this material
+//! is z·p/p_law(z), so a node at the depth of the law stands at its reference level and is in
+//! balance with the ground around it. Pressed deeper, it is too high by the extra depth: this material
 //! leaves it within the commit and goes to the nearest free nodes in eight directions, weighted with 1/distance².
-//! Nothing flows into a node that carries a foot, and into a node below a foot only what fits under it.
+//! Nothing flows into a node that carries a foot, and into a node below a foot only as much as fits under it.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-//! The rule of repose: over a face steeper than the angle of repose φ_r flows a quarter of what is too steep.
+//! The rule of repose: over a face steeper than the angle of repose φ_r flows a quarter of the excess.
 //!
 //! With g_n the difference of the heights of both nodes, g_t the slope along the face (the mean of the central differences of
 //! both) and g = √(g_n² + g_t²), the flux is q = ¼·(g − Δ·tan φ_r)₊·g_n/g rounded down to whole units (Rossmann, Jung and Rast
@@ -134,8 +134,8 @@ pub fn faces_across<T: Thresholds>(
     }
 }
 
-/// Cuts fluxes from nodes with the inlets `from` to nodes with the inlets `to` (slices of the same length) to what
-/// the receiver admits. A node without inlet is closed: it gives nothing, either.
+/// Cuts fluxes from nodes with the inlets `from` to nodes with the inlets `to` (slices of the same length) to the limit
+/// of the receiver. A node without inlet is closed: it gives nothing, either.
 #[inline(always)]
 pub fn admit(flux: &mut [i32], from: &[i32], to: &[i32]) {
     for ((q, from), to) in flux.iter_mut().zip(from).zip(to) {

@@ -27,8 +27,8 @@ impl Span {
         self.hi.saturating_sub(self.lo)
     }
 
-    /// The groups of [`LANES`] columns that hold it. They begin at multiples of [`LANES`], so that what one group has
-    /// stored another loads whole.
+    /// The groups of [`LANES`] columns that hold it. They begin at multiples of [`LANES`], so that a group loads whole
+    /// what another has stored.
     #[inline]
     pub fn whole_groups(self) -> Self {
         Self { lo: self.lo - self.lo % LANES, hi: self.hi.next_multiple_of(LANES) }

@@ -20,11 +20,11 @@ pub enum Face {
     Sheds,
     /// Moving soil: loose soil at rest has cohesion, too.
     Stands,
-    /// Nothing: a node beside it is not visited.
+    /// Nothing: an adjacent node is not visited.
     Waits,
 }
 
-/// Cuts the fluxes to what may flow over the faces; `free` tells how much of both nodes beside a face is not held by cohesion
+/// Limits the fluxes to those allowed over the faces; `free` returns how much of both nodes of a face cohesion does not hold
 /// there, units. A node has four faces, and each takes a quarter of it at most.
 #[inline(always)]
 pub fn hold(flux: &mut [i32], faces: &[Face], free: impl Fn(usize, Face) -> [i32; 2]) {
@@ -48,9 +48,9 @@ const FARTHEST: i32 = 4096;
 pub struct Field<'a> {
     /// Row after row.
     pub levels: &'a [i32],
-    /// Of the bed below what lies loose, row after row.
+    /// Of the bed below loose soil, row after row.
     pub beds: &'a [i32],
-    /// Of what is at rest below what moves, row after row.
+    /// Of the soil at rest below moving soil, row after row.
     pub resting: &'a [i32],
     /// Numbers from a row to the next.
     pub stride: usize,
@@ -72,7 +72,7 @@ pub struct Standing {
     /// By the node at whose right (upper) side the face lies; empty: nothing was looked for.
     along: Vec<Face>,
     across: Vec<Face>,
-    /// Nodes beside those that are visited which a run that falls reaches, per row.
+    /// Nodes next to the visited ones that a falling run reaches, per row.
     pub wake: Vec<Span>,
     /// Fall of the run that touches the border outside the window, units, positive towards larger indices: at the left
     /// and right of every row, below and above every column.
@@ -93,8 +93,8 @@ struct Run {
 }
 
 impl Field<'_> {
-    /// Whether soil above the levels `held` on the higher of two nodes would slide by a unit or two at least; `aside` leads to the
-    /// nodes beside them.
+    /// Whether soil above the levels `held` on the higher of two nodes would slide by a unit or two at least; `aside` leads to
+    /// their neighbours.
     fn sheds(&self, a: usize, b: usize, aside: usize, held: &[i32]) -> bool {
         let h = self.levels;
         if [a, b].iter().any(|k| self.inlets.get(*k) == Some(&0)) {
@@ -117,7 +117,7 @@ impl Standing {
         Self { along: faces(), across: faces(), wake: Vec::with_capacity(rows), beyond }
     }
 
-    /// Nothing is looked for.
+    /// Clears the marks of all faces.
     pub fn clear(&mut self) {
         self.along.clear();
         self.across.clear();
@@ -162,9 +162,9 @@ impl Standing {
         refill(above, columns().map(|i| follow([i, last[1]], [0, 1])));
     }
 
-    /// Marks the faces that stand; `thr`: Δ·tan φ_r at a place, units; `critical`: H_c and H_c', units. A run is longer than what its
-    /// nodes see of each other: over a face with a node that is not visited (`active`: columns by row) nothing flows yet, and
-    /// the node is woken.
+    /// Marks the faces that stand; `thr`: Δ·tan φ_r at a place, units; `critical`: H_c and H_c', units. A run is longer than the part
+    /// that its nodes see: over a face with a node that is not visited (`active`: columns by row) nothing flows yet, and the node is
+    /// woken.
     pub fn find(&mut self, field: &Field, active: &[Span], thr: impl Fn(usize) -> f32, critical: [i32; 2]) {
         self.along.clear();
         self.along.resize(field.levels.len(), Face::Falls);
@@ -219,7 +219,7 @@ impl Standing {
     }
 }
 
-/// Marks the standing faces of a row or column; `aside` leads to the nodes beside it, `ends` fall outside at both ends.
+/// Marks the standing faces of a row or column; `aside` leads to the adjacent nodes, `ends` fall outside at both ends.
 fn mark(
     field: &Field,
     run: Run,
@@ -304,7 +304,7 @@ mod tests {
     #[test]
     fn a_wall_stands_up_to_the_critical_height_however_it_lies_on_the_lattice() {
         for cells in [1, 2, 3, 5] {
-            // the level faces beside the wall stand
+            // the level faces next to the wall stand
             let count =
                 |high: i32, state: Face| wall(high, cells, 1000).0.iter().filter(|s| **s == state).count();
             assert_eq!(count(990, Face::Falls), 0, "{cells}");

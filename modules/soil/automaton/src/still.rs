@@ -1,5 +1,5 @@
 //! Which ground no rule can move, by bounds: the slopes of all faces of a strip and of those around it lie in a range
-//! that neither rule minds. Ground that fails is looked at node by node.
+//! that neither rule minds. Ground that fails is checked node by node.
 //!
 //! With dx, dy the differences over faces along x and y: a flux needs g² = g_n² + g_t² > thr², and g_n is one of the
 //! dx, g_t a mean of four dy, or the reverse. A straight triple bends by the difference of two dx (or two dy), a

@@ -15,7 +15,7 @@ use terraglue_subsystem::Host;
 pub const ROUND: u32 = 8;
 /// Nodes of a window beyond which it pays to give windows to several threads.
 const PARALLEL_NODES: i64 = 4096;
-/// Edge of the blocks in which the ground is looked through, in tiles.
+/// Edge of the blocks in which the ground is scanned, in tiles.
 const BLOCK_TILES: u32 = 4;
 
 /// Counts of the last step, and sums since the start.
@@ -33,7 +33,7 @@ pub struct Counts {
     pub parity: u32,
     /// By how much the sum of the squares of the heights (units) has grown in the last step.
     pub lifted: f64,
-    /// Difference of the heights around the nodes that were active last, units: how high what slides is.
+    /// Difference of the heights around the nodes that were active last, units: the height of the sliding material.
     pub tallest: i32,
     /// Lowest and highest level that was ever seen where something slid, units.
     pub range: [i32; 2],
@@ -50,7 +50,7 @@ impl Default for Counts {
 pub struct Sweeper {
     /// Nodes below feet.
     pub feet: Feet,
-    /// Nodes that have changed outside sweeps; they wake what is around them.
+    /// Nodes that have changed outside sweeps; they wake their surroundings.
     pub changed: Marks,
     /// Nodes whose loose soil moves: material came to them since the last sweep, or they changed in the last round of sweeps.
     pub moving: Marks,
@@ -103,7 +103,7 @@ impl pulp::NullaryFnOnce for Passes<'_> {
     }
 }
 
-/// Both rules once without changing anything: what would move?
+/// Both rules once without changing anything, to find the nodes that would move.
 struct Look<'a> {
     window: &'a mut Window,
     limits: &'a Limits,
@@ -165,7 +165,7 @@ impl Sweeper {
         critical: [f64; 2],
         spacing: f64,
     ) {
-        // what no ground reaches, and infinity, becomes the largest number
+        // heights beyond any ground, and infinity, become the largest number
         let critical = critical.map(|height| (height / UNIT_M) as i32);
         let curvature = curvature::limits(curvature_max, critical[0], spacing);
         let threshold = |angle: f64| repose::threshold(angle, spacing);
@@ -197,7 +197,7 @@ impl Sweeper {
         self.repose.len() + self.curvature.len()
     }
 
-    /// Wakes what the changes outside sweeps reach.
+    /// Wakes the nodes that changes outside sweeps reach.
     pub fn wake_changed(&mut self) {
         if self.changed.is_empty() {
             return;

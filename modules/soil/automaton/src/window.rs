@@ -14,7 +14,7 @@ use crate::standing::{Standing, hold};
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_soil_contact::Ground;
 
-/// Nodes around what is evaluated that are read.
+/// Nodes around the evaluated ones that are read.
 const HALO: usize = 2;
 /// Columns before the first node, so that groups of lanes never leave the row.
 const LEFT: usize = 16;
@@ -101,9 +101,9 @@ pub struct Window {
     pub largest: i32,
     /// Whether every slope stands by cohesion, and nothing lies loose on them.
     all_stands: bool,
-    /// Level of the bed below what lies loose, row after row, where slopes can stand.
+    /// Level of the bed below loose soil, row after row, where slopes can stand.
     beds: Vec<i32>,
-    /// Level of what is at rest below what moves, in the same way.
+    /// Level of the soil at rest below moving soil, in the same way.
     resting: Vec<i32>,
     /// Which slopes stand, where not all do.
     standing: Standing,
@@ -338,7 +338,7 @@ impl Window {
         self.curvature[rows.lo..rows.hi].fill(columns);
     }
 
-    /// Applies the rule of repose once; without `apply` only notes what would change. Returns the largest change.
+    /// Applies the rule of repose once; without `apply` only notes the changes. Returns the largest change.
     #[inline(always)]
     pub fn repose_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
         let rows = self.rows.unwrap_or(Span::NONE);
@@ -467,7 +467,7 @@ impl Window {
         largest
     }
 
-    /// Wakes what the changes of the pass reach.
+    /// Wakes the nodes that the changes of the pass reach.
     #[inline(always)]
     fn wake_around(&mut self) {
         let (columns, rows) = (self.columns.unwrap_or(Span::NONE), self.rows.unwrap_or(Span::NONE));
@@ -518,7 +518,7 @@ impl Window {
         self.curvature.resize(visit.len(), Span::NONE);
         self.curvature.fill(Span::NONE);
         self.changed.fill(Span::NONE);
-        // what was active for the rule of repose stays so
+        // nodes active for the rule of repose stay so
         self.next = std::mem::take(&mut self.repose);
         let mut largest = 0;
         let mut any = [false; 3];

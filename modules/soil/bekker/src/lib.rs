@@ -1,9 +1,9 @@
 //! Soil after Bekker with unloading, Mohr-Coulomb strength and Janosi-Hanamoto shear.
 //!
-//! Pressure and shear act node by node as `terraglue-soil-law` says. The permanent sinkage lowers the ground under
-//! the foot: the soil is compacted, nothing is heaped up beside it. With `material_transport` the ruts slide by the
-//! rules of the automaton (`terraglue-soil-material`); what is pressed still becomes denser in place, unless
-//! `compacted_fraction` says that a part of it goes to the rim.
+//! Pressure and shear act node by node as in `terraglue-soil-law`. The permanent sinkage lowers the ground under
+//! the foot: the soil is compacted, nothing is heaped up around it. With `material_transport` the ruts slide by the
+//! rules of the automaton (`terraglue-soil-material`); pressed soil still becomes denser in place, unless
+//! `compacted_fraction` sends a part of it to the rim.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]
@@ -39,7 +39,7 @@ impl Module for SoilBekker {
 
 /// Key of the option.
 const TRANSPORT: &str = "material_transport";
-/// Share of the pressed volume that becomes denser where a scenario is silent: all, as without transport.
+/// Default share of the pressed volume that becomes denser: all, as without transport.
 const ALL: f64 = 1.0;
 
 fn parameters() -> Vec<Parameter> {
@@ -62,7 +62,7 @@ impl Material for Compaction {
             let units = ground.surface_units(node.i, node.j);
             ground.heights.set_units(node.i, node.j, units);
         }
-        // what becomes denser stays at its height
+        // compacted material stays at its height
         0.0
     }
 }

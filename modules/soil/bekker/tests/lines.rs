@@ -58,7 +58,7 @@ fn an_edge_is_not_thrown_sideways() {
     }
 }
 
-/// The deepest point of a round body lies between the nodes. (The deepest node was told: up to 9 % less of a ball that was 1 cm deep.)
+/// The deepest point of a round body lies between the nodes. (The deepest node gave up to 9 % less of a ball that was 1 cm deep.)
 #[test]
 fn the_depth_that_is_told_is_that_of_the_deepest_point() {
     for (body, limit) in [(ball(), 0.01), (capsule(), 0.01)] {

@@ -1,4 +1,4 @@
-//! Overlays of a soil beside the ground: pressure under a foot and the friction cone, of the committed state alone.
+//! Overlays of a soil on the ground: pressure under a foot and the friction cone, of the committed state alone.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../contact/tests/support/mod.rs"]

@@ -30,7 +30,7 @@ fn print(more: &str) -> Fixture {
     fixture
 }
 
-/// Largest step between neighbours along x and y, m, and what lies below the initial surface in all, m.
+/// Largest step between neighbours along x and y, m, and total depth below the initial surface, m.
 fn shape(fixture: &Fixture) -> (f64, f64) {
     let (heights, sunk) = (Shown::new(&*fixture.soil), Shown::field(&*fixture.soil, "sinkage"));
     let (mut step, mut sum) = (0.0_f64, 0.0);

@@ -44,7 +44,7 @@ fn low(kind: u32, orientation: [f64; 4]) -> f64 {
 }
 
 /// Presses, drags, turns and lifts a body. Returns by how much the ledger errs at worst beyond `share` of the work to and fro and
-/// `held` of what the soil holds at the moment, J.
+/// `held` of the energy in the soil at the moment, J.
 fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) -> Result<f64, TestCaseError> {
     let spacing = [0.02, 0.01, 0.005][grid];
     let config = [LUNAR, LETE, DRY_SAND, SNOW][row];
@@ -102,7 +102,7 @@ proptest! {
         seed in 1..u64::MAX, kind in 0..4u32, row in 0..4usize, grid in 0..3usize,
     ) {
         let error = go(seed, kind, row, grid, [0.01, 0.0])?;
-        // beside it what a node holds that an edge turns onto, until the next steps have paid for it
+        // in addition the energy of a node that an edge turns onto, until the next steps have paid for it
         prop_assert!(error <= 1e-3, "{error:e} J beyond 1 % of the work");
     }
 
@@ -159,8 +159,8 @@ fn forces_converge_in_shorter_steps() {
 }
 
 /// A body that comes through the rim of its own rut down to the bed and aside: the force on it is a continuous function of its
-/// motion in a step. (What the bed bears of a foot that is pushed sideways came at once where the foot met it: `iterative` had
-/// steps without a solution.)
+/// motion in a step. (The reaction of the bed to a foot that is pushed sideways came at once where the foot met it:
+/// `iterative` had steps without a solution.)
 #[test]
 fn the_force_does_not_jump() {
     for (kind, config) in [(0, LUNAR), (0, LETE), (1, LETE), (2, LUNAR), (3, DRY_SAND)] {
@@ -212,8 +212,8 @@ fn largest_jump(fixture: &mut Feet, from: Pose, way: [f64; 3]) -> f64 {
     apart(pair[0].1, pair[1].1)
 }
 
-/// It bears what it is pressed down from there, up to what a body bears that was pressed to its depth (a curved one less by what
-/// its flanks shear), and the ledger starts there: nothing is thrown out. (39 % of its energy came from nowhere.)
+/// It carries load by its further sinkage, up to the load of a body that was pressed to its depth (a curved one less by the
+/// shear of its flanks), and the ledger starts there: nothing is thrown out. (39 % of its energy came from nowhere.)
 #[test]
 fn a_body_that_starts_inside_the_ground_stands_in_its_print() {
     for (kind, config) in [(0, LUNAR), (1, LETE), (2, LETE), (3, LUNAR)] {
@@ -250,7 +250,7 @@ fn a_body_that_starts_inside_the_ground_stands_in_its_print() {
     }
 }
 
-/// A box that is dragged over a coarse lattice comes over a row of nodes at a time and presses out what stands there: no step lifts
+/// A box that is dragged over a coarse lattice comes over a row of nodes at a time and presses out the soil there: no step lifts
 /// more than it has heat to pay for. (The balance missed by up to 2 % of the work for some steps.)
 #[test]
 fn what_is_pressed_out_at_once_is_lifted_as_the_work_allows() {

@@ -1,4 +1,4 @@
-//! A level foot bears the same wherever it stands on the lattice and however it is turned about the vertical.
+//! A level foot carries the same load wherever it stands on the lattice and however it is turned about the vertical.
 #![allow(clippy::unwrap_used)]
 
 mod feet;

@@ -1,5 +1,5 @@
-//! Prints of feet: where cohesion holds their walls, what the foot has pressed out stays where it came to rest around it; in dry
-//! sand all slides down to the angle of repose.
+//! Prints of feet: where cohesion holds their walls, the material that the foot has pressed out stays where it came to rest; in
+//! dry sand all slides down to the angle of repose.
 #![allow(clippy::unwrap_used)]
 
 mod feet;

@@ -72,7 +72,7 @@ proptest! {
     }
 }
 
-/// Ground with walls around: what a body at the edge of it presses out has to go inwards.
+/// Ground with walls around: material that a body at the edge presses out has to go inwards.
 fn pressed(places: &[[f64; 2]], compacted: f64) -> (Feet, i64, i64) {
     let config = format!("{}, \"compacted_fraction\": {compacted}}}", LUNAR.trim_end_matches('}'));
     let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(&config, ground(41, flat)));

@@ -181,7 +181,7 @@ fn assert_equal(ground: &Ground, plain: &Plain) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Sweeps one by one, then forty beside the reference; twice, the second time with `dropped` units in the middle.
+/// Sweeps one by one, then forty next to the reference; twice, the second time with `dropped` units in the middle.
 fn sleepers_are_at_rest(heaps: &Heaps, dropped: i32) -> Result<(), TestCaseError> {
     let (mut ground, mut sweeper) = begin(heaps, Order::Forward);
     let at = heaps.size.map(|n| n as i32 / 2);
@@ -233,7 +233,7 @@ proptest! {
         sleepers_are_at_rest(&heaps, dropped)?;
     }
 
-    /// Sleepers of a steep run wake a node a sweep, so only the end is that of the reference: what is at rest stays at rest.
+    /// Sleepers of a steep run wake a node a sweep, so only the end is that of the reference: nodes at rest stay so.
     #[test]
     fn steep_slopes_stand_up_to_the_critical_height_and_lose_nothing(
         heaps in heaps(), order in any_order(), border in prop::option::of(0.0..1.0f64), critical in 0.005..0.08f64,

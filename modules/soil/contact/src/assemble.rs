@@ -106,7 +106,7 @@ impl Patches {
         let n = &self.nodes;
         let mut bound = Bound::new(n.doubles);
         self.try_each_answer(p, &[0.0; 6], |k, pressure, _, r| {
-            // what the shear and the way of the last step change in what the soil bears belongs to the step that begins
+            // changes of the bearing capacity by shear and motion of the last step belong to the step that begins
             let committed = n.stamp[k] != 0 && n.before[k] > 0.0 && pressure > 0.0;
             let now = if committed { n.before[k] } else { pressure };
             add_force(&mut sum, n.arm[k], self.nodes.force(k, now, r.stress));
@@ -164,7 +164,7 @@ impl Patches {
         Ok(sum)
     }
 
-    /// The same where [`Patches::noted_wrench`] was asked at `x` before.
+    /// The same where [`Patches::noted_wrench`] was evaluated at `x` before.
     pub fn noted_stiffness(&self, p: usize, x: &[f64; 6], noted: &Noted) -> Stiffness {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();

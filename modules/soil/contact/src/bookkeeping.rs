@@ -11,10 +11,10 @@ use crate::wall;
 use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port, Result};
 
-/// Sums over the run and what the last commit found. Part of the committed state.
+/// Sums over the run and results of the last commit. Part of the committed state.
 ///
-/// Heat + elastic energy + gravitational energy of the material = work of the feet: what plastic flow and friction turn into
-/// heat is summed up node by node and not taken from the difference, so that the sum can be held against the work.
+/// Heat + elastic energy + gravitational energy of the material = work of the feet: the heat of plastic flow and friction is
+/// summed up node by node and not taken from the difference, so that the sum can be held against the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyLedger {
     /// Number of commits.
@@ -42,17 +42,17 @@ pub struct EnergyLedger {
 }
 
 impl EnergyLedger {
-    /// Takes in what happened under one foot.
+    /// Adds the turnover under one foot.
     fn take(&mut self, turnover: &Turnover) {
         self.port_work += turnover.work;
         self.dissipated += turnover.heat;
         self.owed += turnover.entered;
     }
 
-    /// Takes `due` (J) of energy that the soil has taken up beside the flow of its nodes out of the heat that was made since it
-    /// was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: what the material is lifted by, and the
-    /// elastic energy of soil that a foot slides onto, which is loaded a node at a time, while what drives the foot works
-    /// steadily.
+    /// Takes `due` (J) of energy that the soil has taken up apart from the flow of its nodes out of the heat that was made
+    /// since it was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: the energy of lifting the
+    /// material, and the elastic energy of soil that a foot slides onto, which is loaded a node at a time, while the drive
+    /// of the foot works steadily.
     pub fn pay(&mut self, due: f64, before: f64) {
         let (due, made) = (self.owed + due, self.dissipated - before);
         (self.dissipated, self.owed) =
@@ -68,7 +68,7 @@ struct Turnover {
     /// Turned into heat.
     heat: f64,
     /// Elastic energy of soil that the foot has come over from the side or that it found compressed as its underside turned;
-    /// what drove it there has paid for it.
+    /// its drive has paid for it.
     entered: f64,
 }
 
@@ -88,7 +88,7 @@ pub struct Lists {
     carried: Vec<f64>,
     /// Per port whether it touches the soil.
     touching: Vec<bool>,
-    /// Pressures and shear of the nodes of a patch, asked of its law together; empty: it is asked node by node.
+    /// Pressures and shear of the nodes of a patch, evaluated by its law together; empty: evaluated node by node.
     answers: Vec<(f64, ShearResponse)>,
 }
 
@@ -124,7 +124,7 @@ struct Pressed<'a> {
     kept: &'a KeptContact,
 }
 
-/// Answer of a law with a state for a node, beside the pressure.
+/// Answer of a law with a state for a node, apart from the pressure.
 #[derive(Default)]
 struct KeptContact {
     permanent: f64,
@@ -295,7 +295,7 @@ impl Scene<'_> {
         let of = |way: [f64; 3]| -dot(answer.force, way);
         let elastic = [0, 1, 2].map(|k| wall.way * (answer.mobilised[k] - before[k]));
         turnover.work += of(u);
-        // plastic flow, what the end-of-step rule damps, and what is left behind where sides have gone
+        // plastic flow, the damping of the end-of-step rule, and energy left behind where sides have gone
         turnover.heat += of([0, 1, 2].map(|k| u[k] - elastic[k])) + (of(elastic) - to + from).max(0.0);
         turnover.heat += (wall.before.energy - from).max(0.0);
         turnover.entered += (from - wall.before.energy).max(0.0);
@@ -304,8 +304,8 @@ impl Scene<'_> {
         contact_memory::remember(&mut ground.pushes, new);
     }
 
-    /// A node that was in contact and is not pressed any more: it clings under tension, or lets go, and what its stretched
-    /// soil held becomes heat.
+    /// A node that was in contact and is not pressed any more: it clings under tension, or lets go, and the energy of its
+    /// stretched soil becomes heat.
     fn cling(
         &self,
         k: usize,
@@ -333,7 +333,7 @@ impl Scene<'_> {
         ledger.elastic += held;
     }
 
-    /// The pressure at node k, where it was not asked for before, and what a law with a state keeps.
+    /// The pressure at node k, evaluated unless `asked`, and the state that a law keeps.
     fn pressure(&self, k: usize, depth: f64, asked: Option<f64>, out: &mut KeptContact) -> Result<f64> {
         match asked {
             _ if kept_by_law(&self.patches.law(k).curve) => self.kept(k, depth, out),
@@ -342,7 +342,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The pressure of a law with a state at node k, and what it keeps.
+    /// The pressure of a law with a state at node k, and the state that it keeps.
     fn kept(&self, k: usize, depth: f64, out: &mut KeptContact) -> Result<f64> {
         let Some((law, b)) = self.patches.law(k).curve.keeper() else { return Ok(0.0) };
         let n = &self.patches.nodes;
@@ -412,8 +412,8 @@ impl Scene<'_> {
         }
     }
 
-    /// Elastic energy of node k between the commits: what belongs to area that the foot has come over, what is left behind
-    /// where it has gone, and what an inclined underside that turns has compressed or relieved beyond its way at the node.
+    /// Elastic energy of node k between the commits: of area that the foot has come over, of area that it has left, and of
+    /// soil that a turning inclined underside has compressed or relieved beyond its way at the node.
     fn take_over(&self, k: usize, state: &NodeState, turnover: &mut Turnover) {
         let n = &self.patches.nodes;
         let now = self.held_at_start(k) + self.sheared_before(k);
@@ -428,7 +428,7 @@ impl Scene<'_> {
         0.5 * self.patches.nodes.area[k] * p * p / self.patches.law(k).curve.unloading()
     }
 
-    /// Elastic energy of node k at the start of the step, J. A law that answers for unloading itself says how far the soil would
+    /// Elastic energy of node k at the start of the step, J. A law that covers unloading itself gives how far the soil would
     /// spring back.
     fn held_at_start(&self, k: usize) -> f64 {
         let n = &self.patches.nodes;
@@ -455,7 +455,7 @@ impl Scene<'_> {
         // the end-of-step rule lets the force act over the gap, too, that a foot closes as it touches
         let gap = if start == 0.0 { (from - n.depth[k]).max(0.0) } else { 0.0 };
         turnover.heat += n.area[k] * p * (to - from + gap) + self.held(k, p - start);
-        // what stays behind the peak of a wheel is the depth of the underside, whatever its pressure
+        // behind the peak of a wheel the depth of the underside stays, whatever its pressure
         (to.max(depth - p / k_u + relief(n, k)), self.held(k, p))
     }
 
@@ -469,8 +469,8 @@ impl Scene<'_> {
             turnover.heat += (n.area[k] * pressure * (depth - n.depth[k]) - held + before).max(0.0);
             return (kept.permanent.max(0.0), held);
         }
-        // what the force did in this step, over the gap, too; soil that the foot comes over from the side is loaded by what
-        // drives the foot
+        // the work of the force in this step, over the gap, too; soil that the foot comes over from the side is loaded by
+        // the drive of the foot
         let from = n.depth[k].min(depth);
         let left = n.area[k] * pressure * (depth - from) - held;
         turnover.heat += left.max(0.0);
@@ -487,7 +487,7 @@ impl Scene<'_> {
         n.area[k] * n.facing[k].stretch * self.patches.law(k).shear.elastic_energy(&n.shear[k])
     }
 
-    /// Shear of a node: its elastic energy, J. Friction and what the end-of-step rule damps become heat.
+    /// Shear of a node: its elastic energy, J. Friction and the damping of the end-of-step rule become heat.
     fn shear_off(&self, node: &Pressed, turnover: &mut Turnover) -> f64 {
         let Pressed { k, shear, .. } = node;
         let (n, law) = (&self.patches.nodes, &self.patches.law(*k).shear);
@@ -501,7 +501,7 @@ impl Scene<'_> {
 }
 
 /// A node that carries nothing any more, of which the underside still reaches below the surface that it met: it stays in its print, where
-/// it will carry again as deep as before. What the soil held becomes heat.
+/// it will carry again as deep as before. The energy in the soil becomes heat.
 fn hold([i, j]: [i32; 2], ground: &mut Ground, lists: &mut Lists, stamp: u64, turnover: &mut Turnover) {
     let state = ground.enter(i, j);
     turnover.heat += state.energy;
@@ -516,7 +516,7 @@ fn kept_by_law(curve: &PressureCurve) -> bool {
     curve.keeper().is_some()
 }
 
-/// Node k at the mean depth `depth` (m) under a pressure (Pa), of whose soil nothing is said yet, and the depth of the underside at the node, m, vertical.
+/// Node k at the mean depth `depth` (m) under a pressure (Pa), its soil not yet set, and the vertical depth of the underside there, m.
 fn covered(n: &PatchNodes, k: usize, [depth, pressure]: [f64; 2], n_z: f64) -> (Covered, f64) {
     let mean = (depth + relief(n, k)) / n_z;
     let deep = mean + n.spread[k].below / n_z;
@@ -546,8 +546,8 @@ fn in_world(port: &Port, v: [f64; 3]) -> [f64; 2] {
 /// enters the contact): where the foot slides over the lattice, at each node by its own way, the slip of the loaded
 /// nodes from `first` on moves with it, ∂j/∂t + v·∇j = 0, first order upwind. A point of a wheel's rim also moves over
 /// the lattice as it comes down. A node onto which the foot slid from
-/// inside the contact takes the mean slip of the contact, weighted with the pressure; what enters from above or
-/// from outside brings nothing. A rolling foot, whose points do not slide, carries nothing along.
+/// inside the contact takes the mean slip of the contact, weighted with the pressure; nodes that enter from above or
+/// from outside bring nothing. A rolling foot, whose points do not slide, carries nothing along.
 fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, entry: Option<[f64; 2]>, stamp: u64) {
     if lists.slid[first..].iter().all(|s| *s == [0.0; 2]) {
         return;
@@ -570,7 +570,7 @@ fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, entry: Optio
                 let at = [[i + behind[0], *j], [*i, j + behind[1]]][axis];
                 let there = ground.nodes.get(at[0], at[1]);
                 let enters = entry.is_some_and(|e| e[axis] * f64::from(behind[axis]) > 0.5);
-                // what carries nothing has forgotten its slip and brings none
+                // an unloaded node has forgotten its slip and brings none
                 let brought = match there.stamp == stamp && there.pressure > 0.0 {
                     true => there.shear.slip,
                     // points of a rim come down in front of the contact and have not slipped yet

@@ -4,10 +4,10 @@ use crate::patch::Local;
 use terraglue_soil_law::YieldNodes;
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
-/// Nodes that are asked together.
+/// Nodes that are evaluated together.
 const CHUNK: usize = 32;
 
-/// Nodes on one law that wait until they are asked.
+/// Nodes on one law that wait to be evaluated.
 pub struct Bound {
     count: usize,
     law: usize,
@@ -26,8 +26,8 @@ impl Bound {
         Self { count: 0, law: 0, doubles, area: zero, pressure: zero, slip: zero, kept }
     }
 
-    /// Adds a node: its law by number, its inclined area (m²), pressure (Pa) and slip (m), what the law keeps of it. Answers
-    /// with the force (N) of those that had to make room.
+    /// Adds a node: its law by number, its inclined area (m²), pressure (Pa) and slip (m), the state that the law keeps of
+    /// it. Returns the force (N) of those that had to make room.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.

@@ -1,10 +1,10 @@
 //! The underside of a body within the cell of a node: how high it lies in the mean, how far it spreads about it, which way it looks.
 //!
 //! A node knows the underside at one point and its slope there. Under an edge, a narrow strip or a round body that is not much
-//! broader than a cell that is not what the soil of the cell meets: of a wedge that comes down edge first a single node would see
-//! all of its depth or none. So the underside is put together from the tangent planes of the node and its neighbours, whose upper
-//! envelope it is where the body is convex: exactly for flat faces that meet in an edge; and bent by the change of the slopes where
-//! it is round.
+//! broader than a cell this misrepresents the contact: of a wedge that comes down edge first a single node would see all of its
+//! depth or none. So the underside is put together from the tangent planes of the node and its neighbours, whose upper envelope it
+//! is where the body is convex: exactly for flat faces that meet in an edge; and bent by the change of the slopes where it is
+//! round.
 
 use crate::fold::{Fold, Underside};
 use crate::patch_nodes::{Facing, PatchNodes, Plane};
@@ -15,7 +15,7 @@ use terraglue_subsystem::Port;
 
 /// An edge nearer to the border of the cell than this part of it leaves the cell flat.
 const NEAR_BORDER: f64 = 0.02;
-/// Slopes are cut where a height field no longer resolves a side, and say nothing there of how it goes on: they count less from here to
+/// Slopes are cut where a height field no longer resolves a side, and do not show there how it goes on: they count less from here to
 /// the cut.
 const STEEP: f64 = 0.5 * STEEPEST_SLOPE;
 /// Slopes that differ by less are alike.

@@ -60,7 +60,7 @@ impl Patches {
         Ok(())
     }
 
-    /// Pressures and slopes; nodes without are left out, those that cling stand at the end.
+    /// Pressures and slopes; nodes without are left out, those that cling come at the end.
     fn press_chunk(&self, law: &Local, chunk: &mut Chunk) -> Result {
         let (curve, count) = (&law.curve, chunk.count);
         let (pressure, slope) = (&mut chunk.pressure[..count], &mut chunk.slope[..count]);
@@ -133,7 +133,7 @@ impl Patches {
         Ok(())
     }
 
-    /// Pressures of a law that keeps a state; what it would keep after the step is dropped.
+    /// Pressures of a law that keeps a state; the state that it would keep after the step is dropped.
     fn kept_pressures(
         &self,
         law: &Local,

@@ -1,9 +1,9 @@
-//! The paper's step 3 in the soil: given what the bodies would do, which wrenches does the soil give so that both agree?
+//! The paper's step 3 in the soil: given the free motion of the bodies, the wrenches of the soil with which both agree.
 //!
-//! The estimate says where the feet would be without the soil, x_free, and how they yield, G = dX/dT. The soil seeks the wrench
+//! The estimate gives the place of the feet without the soil, x_free, and how they yield, G = dX/dT. The soil seeks the wrench
 //! T of its own law at x_free + G·T: Newton on r = T − F(x_free + G·T) with the matrix I + K·G, K = −dF/dX, halved at the
-//! kinks of unloading and slip until |r| falls. So T is what the law gives at the motion that the bodies then make: nothing is
-//! left to iterate between both, and action equals reaction as far as the bodies are linear within the step.
+//! kinks of unloading and slip until |r| falls. So T is the answer of the law to the motion that the bodies then make: nothing
+//! is left to iterate between both, and action equals reaction as far as the bodies are linear within the step.
 
 use crate::assemble::Noted;
 use crate::patch::Patches;
@@ -14,7 +14,7 @@ use terraglue_subsystem::{Estimate, Result};
 const STEPS: usize = 60;
 /// Halvings of one of them.
 const HALVINGS: u32 = 12;
-/// |r| over the largest wrench, and over what rounding leaves of the motion, at which the wrench is found.
+/// |r| over the largest wrench, and over the rounding of the motion, at which the wrench is found.
 const TOLERANCE: f64 = 1e-11;
 
 /// The unknowns with their buffers.
@@ -62,7 +62,7 @@ impl Compatibility {
             let before = left;
             left = self.step(patches, estimate, before)?;
             if left >= before && left <= 1e3 * self.tolerated() {
-                // what rounding leaves
+                // rounding only
                 return Ok(None);
             }
         }

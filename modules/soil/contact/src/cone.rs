@@ -4,7 +4,7 @@
 //! inertia resists a foot that is driven in fast (Aguilar and Goldman 2016, *Nature Physics* 12, 278, who measure about 60°). As the
 //! foot sinks by z the cone grows, a frustum of that height at first: m(z) = c·ρ·⅓πR³·tan ψ·(1 − (1 − z/H)³), H = R·tan ψ, ψ = 45° + φ/2,
 //! and m = c·ρ·⅓πR²H from z = H on. Its momentum m·w (w: speed into the soil) gives the force d(m·w)/dt. The soil does not
-//! pull at the foot: where the foot stops or leaves, the cone loses what it has as heat.
+//! pull at the foot: where the foot stops or leaves, the cone loses its energy as heat.
 
 use crate::contact_memory::Remembered;
 use crate::patch_nodes::PatchNodes;

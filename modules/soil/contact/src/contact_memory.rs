@@ -12,7 +12,7 @@ pub trait Remembered: Copy {
     }
 }
 
-/// Keeps what a contact remembers.
+/// Keeps the memory of a contact.
 pub fn remember<T: Remembered>(all: &mut Vec<T>, new: T) {
     match all.binary_search_by_key(&new.key(), T::key) {
         Ok(k) => all[k] = new,
@@ -25,7 +25,7 @@ pub fn recall<T: Remembered>(all: &[T], key: u64) -> T {
     all.binary_search_by_key(&key, T::key).map_or_else(|_| T::new(key), |k| all[k])
 }
 
-/// Forgets the contacts that have left the soil; what they held becomes heat, J.
+/// Forgets the contacts that have left the soil; their energy becomes heat, J.
 pub fn release<T: Remembered>(all: &mut Vec<T>, touching: impl Fn(u64) -> bool) -> f64 {
     let mut heat = 0.0;
     all.retain(|one| {

@@ -4,7 +4,7 @@ use crate::patch_nodes::PatchNodes;
 use crate::wheel::Wheel;
 use terraglue_subsystem::{Causality, Variable};
 
-/// Name, unit and meaning of what is told.
+/// Name, unit and meaning of the variables.
 const QUANTITIES: [(&str, &str, &str); 9] = [
     ("slip", "", "slip of a wheel: 0 rolls, 1 spins on the spot, below 0 is braked; 0 for a foot"),
     ("sinkage", "m", "depth of the deepest point below the reference level of the soil there"),
@@ -36,7 +36,7 @@ pub struct Contacts {
 }
 
 impl Contacts {
-    /// Tells of at most `shown` contacts.
+    /// Variables for at most `shown` contacts.
     pub fn new(shown: usize) -> Self {
         Self { shown, all: Vec::with_capacity(shown) }
     }
@@ -75,7 +75,7 @@ impl Contacts {
         }
     }
 
-    /// Whether anything is told.
+    /// Whether there are any.
     pub fn any(&self) -> bool {
         self.shown > 0
     }
@@ -129,7 +129,7 @@ impl Touch {
         }
     }
 
-    /// Takes what rolls there, the wrench on the body and its motion `x` over `h` seconds.
+    /// Takes the wheel there, if any, the wrench on the body and its motion `x` over `h` seconds.
     pub fn under(&mut self, wheel: Option<&Wheel>, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
         self.normal = wrench[0];
         self.pull = wrench[1];

@@ -2,14 +2,14 @@
 
 use crate::patch_nodes::Plane;
 
-/// Points along each side of a cell at which an underside with an edge is looked at.
+/// Points along each side of a cell at which an underside with an edge is sampled.
 const SAMPLES: usize = 4;
 const POINTS: usize = SAMPLES * SAMPLES;
 /// Distance of the outermost of them from the node, in cells.
 const OUTERMOST: f64 = 0.5 - 0.5 / SAMPLES as f64;
-/// The standard deviation of evenly spaced mid-points is smaller than that of what they stand for.
+/// The standard deviation of evenly spaced mid-points is smaller than that of the intervals they represent.
 const MIDPOINTS: f64 = 1.032_795_558_988_644;
-/// Weight of what is not in the soil, so that an underside looks somewhere before it touches.
+/// Weight of points that are not in the soil, so that an underside looks somewhere before it touches.
 const OUTSIDE: f64 = 1e-3;
 /// The plane of the node and those of its eight neighbours.
 const FACES: usize = 9;
@@ -20,14 +20,14 @@ pub struct Underside {
     pub rise: f64,
     /// Variance of the height above the plane of the ground, m².
     pub variance: f64,
-    /// ∂z/∂x and ∂z/∂y of what is in the soil.
+    /// ∂z/∂x and ∂z/∂y of the part in the soil.
     pub slope: [f64; 2],
     /// Mean of √(1 + slope²) over that of the mean slope.
     pub steeper: f64,
 }
 
-/// The planes that meet in a cell. The envelope looks where what lies in the soil does: the faces of a wedge that are in the soil press it,
-/// not those above.
+/// The planes that meet in a cell. The envelope faces as its part in the soil does: the faces of a wedge in the soil press it, not those
+/// above.
 pub struct Fold {
     planes: [Plane; FACES],
     count: usize,
@@ -116,7 +116,7 @@ struct Face {
     slope: [f64; 2],
     /// √(1 + slope²).
     stretch: f64,
-    /// Part of what a point stands for that is in the soil where the point lies at its level, and its change with the height, 1/m: one
+    /// Part of the cell around a point that is in the soil where the point lies at its level, and its change with the height, 1/m: one
     /// over the height by which the face falls there; one that is level is in the soil as a whole.
     inside: [f64; 2],
 }
@@ -134,7 +134,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A plane that lies below the first one at all points changes nothing, and one alone is what the points say.
+        /// A plane that lies below the first one at all points changes nothing, and the points reproduce one alone.
         #[test]
         fn what_lies_lower_everywhere_is_left_out(
             slope in prop::array::uniform2(-1.0..1.0f64), other in prop::array::uniform2(-2.0..2.0f64), below in -0.01..0.01f64,

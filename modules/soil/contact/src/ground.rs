@@ -1,4 +1,4 @@
-//! The ground of a soil: heights of its material and what it remembers at each node.
+//! The ground of a soil: heights of its material and the memory of each node.
 
 use crate::cone::Carried;
 use crate::contacts::Contacts;
@@ -10,7 +10,7 @@ use crate::wheel::Memory;
 use terraglue_ground::{HeightField, TILE_EDGE, UNIT_M};
 use terraglue_subsystem::{Result, Terrain};
 
-/// Wheels for which memory is asked at the start.
+/// Wheels for which memory is allocated at the start.
 const WHEELS: usize = 64;
 
 /// A node below a foot, as committed.
@@ -30,7 +30,7 @@ pub struct Covered {
     pub virgin: f64,
     /// Height of the unloaded surface, from the unrounded state, m; NaN where the foot does not touch.
     pub surface: f64,
-    /// Horizontal part of the direction in which the underside moves, world x and y: what is pressed out flows with it.
+    /// Horizontal part of the direction in which the underside moves, world x and y: displaced soil flows with it.
     pub flow: [f64; 2],
 }
 
@@ -133,8 +133,8 @@ impl Ground {
         ((state.reference - state.permanent) / UNIT_M).round() as i32
     }
 
-    /// Books `units` of material that came to a node without a foot (or went, < 0). What comes lies loose on the bed, which
-    /// stays as it was pressed; what goes is loose soil first.
+    /// Books `units` of material that came to a node without a foot (or went, < 0). Arriving material lies loose on the
+    /// bed, which stays as it was pressed; loose soil leaves first.
     #[inline]
     pub fn add_material(&mut self, i: i32, j: i32, units: i32) {
         if units == 0 || !self.heights.lattice().has(i, j) {
@@ -145,9 +145,9 @@ impl Ground {
     }
 
     /// Puts the nodes from (i, j) on along x at `heights` (units), as [`Ground::add_material`] books it. All are nodes
-    /// of the lattice. Returns what they gained together, the sum of what single ones gained, and by how much the sum of the
-    /// squares of the heights has grown: twice the gravitational energy. `told` hears the index along x of every node that
-    /// has changed.
+    /// of the lattice. Returns their total gain, the sum of the single gains, and by how much the sum of the squares of the
+    /// heights has grown: twice the gravitational energy. `told` is called with the index along x of every node that has
+    /// changed.
     pub fn put_row(&mut self, i: i32, j: i32, heights: &[i32], mut told: impl FnMut(i32)) -> [i64; 3] {
         let (mut gained, mut moved, mut lifted) = (0, 0, 0);
         let (mut i, mut rest) = (i, heights);

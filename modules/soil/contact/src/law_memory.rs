@@ -3,7 +3,7 @@
 
 use terraglue_ground::{Lattice, TileMap, TileMapSnapshot};
 
-/// Tiles for which memory is asked at the start, per double.
+/// Tiles for which memory is allocated at the start, per double.
 const RESERVE_TILES: usize = 64;
 
 /// One map of the lattice per double.

@@ -1,15 +1,15 @@
 //! Common parts of all soils on a height field: contact patches, node states, fields, variables; a soil adds the motion
 //! of material.
 //!
-//! A soil module brings a [`Material`], which says where the soil under a foot goes; [`FieldSoil`] makes a
+//! A soil module brings a [`Material`], which determines where the soil under a foot goes; [`FieldSoil`] makes a
 //! subsystem of it. The pressure and shear laws act node by node on floating-point depths; the fixed-point
-//! height field only books what stays.
+//! height field only books permanent changes.
 //!
 //! # Depths
 //! A node has a *reference level*, where the surface of its bed would be if it had never been pressed, and an *unloaded
 //! surface* at the depth z₀ below it, above it where loose soil lies on the bed. The depth under a foot is counted from the
 //! reference level along the port's normal n: z = (reference − underside)·n_z − X_n − (rotation). The soil is elastic above
-//! z₀ up to the pressure at which it yields; what yields moves z₀ down.
+//! z₀ up to the pressure at which it yields; yielding moves z₀ down.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-//! Regions of the ground with soils of their own: a number at every node says which soil it is.
+//! Regions of the ground with soils of their own: a number at every node selects its soil.
 //!
 //! A scenario gives a picture or a grid of labels (`[soil.mask] file`); its reader, the host, makes of it the tables of
 //! numbers (`mask.soils`) and one number per node (`mask.runs`), so that a module opens no file. A foot on a border is carried
@@ -9,7 +9,7 @@ use terraglue_ground::Lattice;
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// Soils beside the scenario's own at most.
+/// Largest number of soils in addition to the scenario's own.
 pub const MOST_SOILS: usize = 62;
 
 /// Parameters of a soil on a field in its scenario table: the laws' numbers and the mask.

@@ -8,7 +8,7 @@ use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::Persist;
 
-/// Tiles of pressed ground, and nodes below feet, for which memory is asked at the start.
+/// Tiles of pressed ground, and nodes below feet, for which memory is allocated at the start.
 const RESERVE_TILES: usize = 256;
 const RESERVE_NODES: usize = 4096;
 const RESERVE_INDEX: usize = 64;
@@ -140,9 +140,9 @@ impl Kept {
         f64::from(self.loose_units()) * UNIT_M
     }
 
-    /// After `units` of material have come to lie loose on the bed, or have gone from it (< 0), loose ones first. What comes
-    /// counts to the unit, however little a short step brings. What goes counts in whole `TRICKLE`s, so that a slide of a
-    /// few micrometres ends.
+    /// After `units` of material have come to lie loose on the bed, or have gone from it (< 0), loose ones first. Arriving
+    /// material counts to the unit, however little a short step brings. Leaving material counts in whole `TRICKLE`s, so that
+    /// a slide of a few micrometres ends.
     #[inline]
     fn changed(self, units: i32) -> Self {
         let units = if units < 0 { units.div_euclid(Self::TRICKLE) * Self::TRICKLE } else { units };
@@ -276,7 +276,7 @@ impl NodeStates {
         }
         self.unlist(tile, k);
         let (above, left) = (height - (state.reference - state.permanent), state.loose_left());
-        // what has flowed into a print under a foot that carried nothing lies loose
+        // material that has flowed into a print under an unloaded foot lies loose
         let flowed = if state.pressure > 0.0 { 0.0 } else { ((above / UNIT_M).round() * UNIT_M).max(0.0) };
         let kept = Kept::new(state.permanent + left, flowed - above, left + flowed, state.half);
         self.keep(tile, k, kept);
@@ -302,7 +302,7 @@ impl NodeStates {
         }
     }
 
-    /// `units` of material came to node (i, j) or went (< 0), where no foot stands: what comes lies loose.
+    /// `units` of material came to node (i, j) or went (< 0), where no foot stands: arriving material lies loose.
     #[inline]
     pub fn add_loose(&mut self, i: i32, j: i32, units: i32) {
         let (tile, k, place) = self.place(i, j);

@@ -11,7 +11,7 @@ impl Patches {
     /// X_n of the soil's surface under the normal force `force` (N) when the other components of the motion of the
     /// foot of patch `p` are those of `x`; for `force` ≤ 0 the height at which the foot just leaves the soil.
     ///
-    /// The force mostly grows with the depth: Newton from where the foot is said to be (X_n = 0: from the last solution
+    /// The force mostly grows with the depth: Newton from the given place of the foot (X_n = 0: from the last solution
     /// of the step), kept inside a bracket whose lower end carries nothing. Where cohesion pulls at an inclined node as
     /// soon as it is touched, a force belongs to two depths close together; the one next to the foot is meant.
     /// Its upper end carries `force` by pressure alone; where shear on inclined undersides

@@ -1,7 +1,7 @@
 //! Overlays of a soil at its contacts: the pressure at every node, and the friction cone of every contact.
 //!
-//! Both follow from the committed nodes alone. Nodes that lie beside each other, also across a corner, are one contact; its
-//! normal is that of the plane through the reference levels of its nodes by least squares.
+//! Both follow from the committed nodes alone. Adjacent nodes, also across a corner, are one contact; its normal is that of
+//! the plane through the reference levels of its nodes by least squares.
 
 use crate::ground::Ground;
 use std::collections::BTreeSet;

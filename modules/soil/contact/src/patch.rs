@@ -1,4 +1,4 @@
-//! The contact patches of a step: per port the curve of its pressure law, per node depth, area, history and what it bears.
+//! The contact patches of a step: per port its pressure curve, per node depth, area, history and bearing capacity.
 //!
 //! Built once per step from the committed state into flat arrays, so that trials touch neither the lattice nor
 //! the allocator.
@@ -17,7 +17,7 @@ use terraglue_soil_law::strength::{Inclination, slope_factor};
 use terraglue_soil_law::{Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw};
 use terraglue_subsystem::{Node, Port, Result, Step};
 
-/// One port's share of the arrays and what is constant during the step.
+/// One port's share of the arrays and its constants during the step.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// First node in the arrays and one past the last.
@@ -134,9 +134,9 @@ pub struct Patches {
     pub sides: Vec<Side>,
     /// Clinging nodes; scratch of [`Patches::pull`].
     pub(crate) clinging: ClingingNodes,
-    /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::EnergyLedger::pay`].
+    /// Whether energy is owed for soil that feet came over, see [`crate::bookkeeping::EnergyLedger::pay`].
     pub in_debt: bool,
-    /// Whether this is the first step of all: what is inside the ground then stands in its own print.
+    /// Whether this is the first step of all: bodies inside the ground then stand in their own print.
     pub begins: bool,
     /// Whether something is.
     pub prints: bool,
@@ -249,8 +249,8 @@ impl Patches {
         })
     }
 
-    /// Bearing capacity of the nodes in `range` relative to the pressure of first loading, and beside it: less on
-    /// inclined faces, less under shear, more on faces that are pushed sideways.
+    /// Bearing capacity of the nodes in `range` relative to the pressure of first loading, and passive pressure of their
+    /// sides: less on inclined faces, less under shear, more on faces that are pushed sideways.
     fn bear(&mut self, direction: &Direction, wall: &Wall, b: f64, range: std::ops::Range<usize>) {
         let inclination = direction.load_inclination.then(|| self.inclination(range.clone())).flatten();
         for k in range {
@@ -269,8 +269,8 @@ impl Patches {
         }
     }
 
-    /// Resultant of the shear along t1 and t2 over the sum of the magnitudes: what balances within the contact, as under a sphere
-    /// that is pressed straight down, does not incline its load.
+    /// Resultant of the shear along t1 and t2 over the sum of the magnitudes: shear that balances within the contact, as under a
+    /// sphere that is pressed straight down, does not incline its load.
     fn inclination(&self, range: std::ops::Range<usize>) -> Option<[f64; 2]> {
         let n = &self.nodes;
         let (mut sum, mut all) = ([0.0; 2], 0.0);
@@ -285,12 +285,12 @@ impl Patches {
 
     /// Starts the nodes in `range` where the last commit left them, and finds up to which pressure they are elastic.
     ///
-    /// Within a step the underside moves as its slope says; by how much the exact one lies elsewhere afterwards (its
-    /// curvature, an edge that passes) moves the unloaded surface and not the pressure, so that no energy comes of it. Where the
-    /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node. What the foot has
-    /// come over from the side bears at once what its depth asks for, as far as [`Patches::affordable`] goes, and what drives
-    /// the foot pays for it; the rest bears what it is pressed down from there. A body that is inside the ground at the very
-    /// start stands in its own print: it was pressed there before, and bears what it is pressed down from there.
+    /// Within a step the underside moves along its slope; the deviation of the exact one afterwards (its curvature, an edge that
+    /// passes) moves the unloaded surface and not the pressure, so that no energy comes of it. Where the underside has gone up
+    /// by more than half of the elastic rebound of the soil, the foot is leaving the node. Soil that the foot has come over
+    /// from the side carries the load of its depth at once, as far as [`Patches::affordable`] goes, and the drive of the foot
+    /// pays for it; the rest is loaded by further sinkage from there. A body that is inside the ground at the very start stands
+    /// in its own print: it was pressed there before, and is loaded by further sinkage.
     fn start(&mut self, range: std::ops::Range<usize>) -> Result {
         let share = self.affordable(range.clone())?;
         for k in range {
@@ -392,8 +392,8 @@ impl Patches {
         Ok((first..self.laws.len(), friction))
     }
 
-    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there. How its stress changes over a
-    /// cell is not told by the underside.
+    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there. The underside does not
+    /// determine how its stress changes over a cell.
     fn shift_peak(&mut self, wheel: &Wheel, shift: &Shift, range: std::ops::Range<usize>) -> Result {
         for k in range {
             let Some(relief) = wheel.relief(shift, self.nodes.arm[k]) else { continue };
@@ -513,7 +513,7 @@ fn gather_wall(
 /// Pressure at node k over that at which it yields.
 fn yielded(patches: &Patches, k: usize) -> Result<f64> {
     if patches.law(k).curve.keeper().is_some() {
-        // what a law with a state would yield at is its own affair
+        // a law with a state determines its own yield
         return Ok(if patches.nodes.before[k] > 0.0 { 1.0 } else { 0.0 });
     }
     let (p, yields) = (patches.pressure(k, patches.nodes.depth[k])?.0, patches.nodes.bound[k]);

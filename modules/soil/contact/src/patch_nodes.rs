@@ -81,7 +81,7 @@ pub struct PatchNodes {
     pub loose: Vec<f64>,
     /// Part of the pressure of first loading that the soil bears here.
     pub share: Vec<f64>,
-    /// Passive pressure that it bears beside, a + b·z: Pa and Pa/m.
+    /// Passive pressure that it bears in addition, a + b·z: Pa and Pa/m.
     pub passive: Vec<[f64; 2]>,
     /// Pressure up to which the node is elastic wherever it is, Pa; −∞: it yields at X = 0.
     pub bound: Vec<f64>,

@@ -36,8 +36,8 @@ impl Size {
         Self { area, square: [xx - x * x - cell, yy - y * y - cell, xy - x * y] }
     }
 
-    /// b of the pressure law, m: radius of the disc of equal area, but no more than that of the disc which bears what an
-    /// endless strip of this breadth does.
+    /// b of the pressure law, m: radius of the disc of equal area, but no more than that of the disc which bears the
+    /// pressure of an endless strip of this breadth.
     pub fn b(&self, spacing: f64) -> f64 {
         let disc = (self.area / std::f64::consts::PI).sqrt();
         disc.min(STRIP * self.breadth()).max(0.5 * spacing)

@@ -57,12 +57,12 @@ pub trait Material: Send {
     /// The laws' parameters have changed.
     fn parameters_changed(&mut self, _ground: &Ground, _parameters: &SoilParameters) {}
     /// After the laws have taken a step of h seconds: puts the material where it belongs. `covered` are the nodes
-    /// below feet. `most` (J): the gravitational energy that the step can pay for; what would gain more waits. Returns the
-    /// gravitational energy that the material has gained, J; what it loses becomes heat.
+    /// below feet. `most` (J): the gravitational energy that the step can pay for; material that would gain more waits.
+    /// Returns the gravitational energy that the material has gained, J; a loss becomes heat.
     fn redistribute(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64;
     /// Copies the state into `out`.
     fn save(&self, _out: &mut Self::Saved) {}
-    /// Whether a saved state speaks of nodes of this ground only.
+    /// Whether a saved state contains nodes of this ground only.
     fn fits(&self, _saved: &Self::Saved, _ground: &Ground) -> bool {
         true
     }
@@ -171,7 +171,7 @@ impl<M: Material> FieldSoil<M> {
         self.plugin.as_ref().map_or(Ok(()), |plugin| plugin.reaches(step.t))
     }
 
-    /// Fills x, v, a with the committed surface: along n as `set_ports` says, at rest otherwise.
+    /// Fills x, v, a with the committed surface: along n as in `set_ports`, at rest otherwise.
     fn show_surface(&self, now: &mut Response) {
         now.x.fill(0.0);
         now.v.fill(0.0);
@@ -215,7 +215,7 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
-/// Size of a contact for which a law is looked at before there is any, m.
+/// Size of a contact for which a law is checked before there is any, m.
 const TYPICAL_SIZE: f64 = 0.1;
 
 /// The laws of the scenario's own soil and of those of the mask.
@@ -228,7 +228,7 @@ fn all_laws(
     std::iter::once(own).chain(&mask.soils).map(|p| laws_of(p, texts, plugin)).collect()
 }
 
-/// Says where unloading is softer than a law that is a module; the host knows of the others and where they are written.
+/// Warns where unloading is softer than a law that is a module; the host warns of the others, with their places.
 fn warn_of_module(laws: &Laws, host: &dyn Host) {
     if let (PressureLaw::Plugin(law), Some(softened)) = (&laws.pressure, laws.pressure.softened(laws.elastic))
     {
@@ -236,7 +236,7 @@ fn warn_of_module(laws: &Laws, host: &dyn Host) {
     }
 }
 
-/// The laws with these numbers; what the scenario writes as text takes the place of the built-in law.
+/// The laws with these numbers; a law that the scenario writes as text replaces the built-in one.
 fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&PluginLaw>) -> Result<Laws> {
     let mut laws = Laws {
         pressure: p.pressure(),
@@ -272,7 +272,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
         law.begin(0.0);
         if law.has_pressure() {
             laws.take_pressure(PressureLaw::Plugin(law.clone()), p)?;
-            // as the built-in laws are looked at: one that says nothing sensible here never will
+            // checked as the built-in laws: one that fails here always will
             laws.pressure.curve(TYPICAL_SIZE, laws.elastic)?;
         }
         if law.has_shear() {
@@ -283,7 +283,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
 }
 
 impl Laws {
-    /// A pressure law takes the place of the built-in one, and the soil springs back as it does where nobody says how.
+    /// A pressure law replaces the built-in one, and the soil springs back by the default stiffness.
     fn take_pressure(&mut self, law: PressureLaw, p: &SoilParameters) -> Result {
         self.elastic = p.elastic_stiffness_pa_m.map_or_else(|| law.unloading(), Ok)?;
         self.shear = self.shear.above(self.elastic);

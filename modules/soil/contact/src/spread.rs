@@ -6,8 +6,8 @@
 /// The depths in a cell. The default: all alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
-    /// Range of the heights H, along n, m. Less what the print has that the foot found here: a foot that comes back into its own finds
-    /// the soil everywhere at once.
+    /// Range of the heights H, along n, m. Less the range of the print that the foot found here: a foot that comes back into its own
+    /// finds the soil everywhere at once.
     pub range: f64,
     /// Mean of the heights above the lowest one, along n, m.
     low: f64,
@@ -74,7 +74,7 @@ impl Spread {
     }
 
     /// By how much the mean depth of the soil's surface exceeds the mean depth of the underside, m, where the surface was at `top` and
-    /// the underside, at the mean depth `depth`, has taken along what it met: of a cell that is in the soil in part the rest lies above.
+    /// the underside, at the mean depth `depth`, has taken the soil along: of a cell that is in the soil in part the rest lies above.
     pub fn above(&self, depth: f64, top: f64) -> f64 {
         let inside = self.inside(depth, top);
         if self.range <= 0.0 || inside >= self.range {
@@ -123,7 +123,7 @@ const LEAST_MEAN: f64 = 1.0 / 3.0;
 /// Places of Gauss and Legendre's two points in a range from 0 to 1; both weigh alike.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Depths at which a pressure is looked at for its mean over a cell.
+/// Depths at which a pressure is evaluated for its mean over a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
     /// Both depths, m.
@@ -135,7 +135,7 @@ pub struct Look {
 }
 
 impl Look {
-    /// Mean over the cell of a pressure and its slope from those at both depths; what is not in the soil carries nothing.
+    /// Mean over the cell of a pressure and its slope from those at both depths; parts outside the soil carry nothing.
     #[inline]
     pub fn mean(&self, [(p, p_slope), (q, q_slope)]: [(f64, f64); 2]) -> (f64, f64) {
         let slope =

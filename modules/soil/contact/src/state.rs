@@ -66,7 +66,7 @@ impl<S: Persist> Persist for Slot<S> {
     }
 }
 
-/// Content of a slot beside the material's own state.
+/// Content of a slot apart from the material's own state.
 pub struct Committed<'a> {
     /// Heights and node states.
     pub ground: &'a Ground,

@@ -70,7 +70,7 @@ pub fn set(variable: &Variable, value: f64, p: &mut SoilParameters) -> Result {
     Ok(())
 }
 
-/// Refuses what is not a number or outside the bounds of the variable.
+/// Refuses a value that is not a number or outside the bounds of the variable.
 pub fn check(variable: &Variable, value: f64) -> Result {
     let inside = value >= variable.min && value <= variable.max;
     if inside {

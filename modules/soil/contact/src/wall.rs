@@ -1,4 +1,4 @@
-//! Passive earth pressure: what the soil beside a contact answers when the contact is pushed sideways.
+//! Passive earth pressure: the reaction of the soil beside a contact that is pushed sideways.
 //!
 //! The sides of a foot that stands in the soil are walls. A wall that is pushed against the soil meets the passive pressure
 //! a + b·z of Rankine (1857), which is built up like friction: elastic over the way w₀, then it yields. A wall that is pushed
@@ -112,7 +112,7 @@ impl Wall {
                 }
             }
         }
-        // d(e)/d(u): the identity, or what is left of it across e, over the way
+        // d(e)/d(u): the identity, or its part across e, over the way
         let own = scale / self.way;
         let de: [[f64; 3]; 3] = std::array::from_fn(|r| {
             std::array::from_fn(|c| {
@@ -197,12 +197,12 @@ pub struct Beside<'a> {
     pub wedge: f64,
 }
 
-/// Cells over which the loose soil on a wedge is looked at, at most.
+/// Cells over which the loose soil on a wedge is measured, at most.
 const MOST_CELLS: i32 = 32;
 
 impl Beside<'_> {
     /// Mean height (m) of the loose soil on the wedge beside node `at` that a wall pushes up, towards the neighbour `way`;
-    /// `height` of the wall in the bed, m. What lies on the wedge weighs on it, wherever that is.
+    /// `height` of the wall in the bed, m. Loose soil on the wedge loads it, wherever it lies.
     fn loose(&self, at: [i32; 2], way: (i32, i32), height: f64) -> f64 {
         let cells = (self.wedge * height / self.lattice.spacing).clamp(1.0, f64::from(MOST_CELLS));
         let (mut sum, mut left, mut k) = (0.0, cells, 0);

@@ -1,6 +1,6 @@
 //! Wheels: which contacts roll, how fast they slip, and the shifted peak of their stress.
 //!
-//! A wheel is told by its underside, not by its name: where the nodes lie on a circular cylinder, each of them is
+//! A wheel is recognised by its underside, not by its name: where the nodes lie on a circular cylinder, each of them is
 //! r·(n − ν) away from the lowest line, with ν the inward normal there. A flat foot, whose normals are all alike, and
 //! a sphere, which is round in both directions, do not roll.
 
@@ -19,7 +19,7 @@ const LEANING: f64 = 0.35;
 
 /// Part of its cell from which on a node counts as covered.
 const WHOLE: f64 = 0.999;
-/// Fewer covered nodes than these do not tell a circle.
+/// Fewer covered nodes than these do not determine a circle.
 const FEW: usize = 4;
 
 /// Memory of a contact that rolls. Part of the committed state.
@@ -54,8 +54,8 @@ pub struct Wheel {
 }
 
 impl Wheel {
-    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll. What was a wheel stays one
-    /// while it is loaded, also where too few nodes are left to look round, as on an edge or a crest.
+    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll. A wheel stays one while it
+    /// is loaded, also where too few nodes are left to look round, as on an edge or a crest.
     pub fn find(
         nodes: &PatchNodes,
         range: std::ops::Range<usize>,
@@ -146,7 +146,7 @@ impl Wheel {
     ) -> Option<Shift> {
         let share = rolling.peak_share(self.memory.slip);
         let used = || range.clone().filter(|k| nodes.area[*k] > 0.0).map(|k| (k, self.angle(nodes.arm[k])));
-        // Nodes near the bottom may carry nothing: what the wheel has left there is not the soil ahead.
+        // Nodes near the bottom may carry nothing: the soil left there is not the soil ahead.
         let front = used().filter(|(k, _)| nodes.stamp[*k] != 0).fold(0.0_f64, |front, (_, a)| front.max(a));
         let (mut bottom, mut sum, mut count) = (0.0_f64, 0.0, 0.0);
         for (k, angle) in used() {

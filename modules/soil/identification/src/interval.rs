@@ -1,6 +1,6 @@
 //! Confidence intervals of a fit. The readings of one press are no independent numbers: they err together. So whole
 //! curves are left out in turn (jackknife over groups; Efron and Tibshirani 1993, An Introduction to the
-//! Bootstrap, ch. 11) and the spread of the answers tells how well the numbers are known.
+//! Bootstrap, ch. 11) and the spread of the answers shows how well the numbers are known.
 
 use crate::plate_law::{FitLaw, PlateNumbers, Reading};
 use crate::{solve::solve, student};
@@ -47,7 +47,7 @@ pub fn intervals(
     (all, basis)
 }
 
-/// Intervals of the numbers `at` that `answer` finds: it is asked again with whole curves, or pieces of them, left out.
+/// Intervals of the numbers `at` that `answer` finds: it is called again with whole curves, or pieces of them, left out.
 pub(crate) fn jackknife(
     readings: &[Reading],
     answer: &mut dyn FnMut(&[Reading]) -> Option<Vec<f64>>,

@@ -20,7 +20,7 @@ pub struct Free {
 pub struct NumbersFit {
     /// The numbers in their order.
     pub numbers: Vec<f64>,
-    /// 95 % confidence; NaN where the readings say nothing of a number, which is left at its start then.
+    /// 95 % confidence; NaN where the readings do not determine a number, which is left at its start then.
     pub intervals: Vec<Interval>,
     /// Basis of the intervals.
     pub basis: Basis,
@@ -73,7 +73,7 @@ fn logarithms(law: &mut Pressures, x: &[f64], readings: &[Reading]) -> Option<Ve
 pub struct Least {
     /// The numbers in their order.
     pub numbers: Vec<f64>,
-    /// Whether the residuals feel each of them; what they do not feel is left at its start.
+    /// Whether the residuals depend on each of them; the others are left at their start.
     pub felt: Vec<bool>,
     /// Sum of the squares of the residuals.
     pub squares: f64,

@@ -15,7 +15,7 @@ pub struct Reading {
     pub pressure: f64,
 }
 
-/// The laws that can be fitted; the factors A and B are found, see [`terraglue_soil_law::PressureLaw`] for what they mean.
+/// The laws that can be fitted; the factors A and B are found, see [`terraglue_soil_law::PressureLaw`] for their meaning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FitLaw {

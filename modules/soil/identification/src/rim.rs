@@ -1,5 +1,5 @@
 //! Rigid wheel on soil by integration of the stresses below the rim (Wong and Reece 1967, J. Terramechanics 4),
-//! with Bekker's pressure and the shear of Janosi and Hanamoto: what wheels are fitted with and held against.
+//! with Bekker's pressure and the shear of Janosi and Hanamoto: the model that wheels are fitted with and compared with.
 //!
 //! Angles are counted from the lowest point of the rim, positive where soil enters. The wheel enters the soil at θ_f
 //! = arccos(1 − h/r) and leaves it at 0, or a little behind where the soil springs back; the largest stress lies at θ_m =

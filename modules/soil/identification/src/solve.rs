@@ -6,7 +6,7 @@ use crate::plate_law::{FitError, FitLaw, PlateNumbers, Reading};
 /// Points of the coarse search for λ, and halvings of the interval around the best one.
 const COARSE: u32 = 64;
 const GOLDEN_STEPS: u32 = 80;
-/// Smallest spread of ln x that tells an exponent.
+/// Smallest spread of ln x that determines an exponent.
 const SPREAD: f64 = 1e-9;
 
 /// One reading as the fit sees it: u/u_0, w/w_0, ln x and ln p.

@@ -1,8 +1,8 @@
 //! A soil from a wheel: sinkage and drawbar pull of a driven wheel over its slip, fitted by the integral of the stresses below
 //! the rim with Bekker's pressure, Ding's slip sinkage and the shear between rim and soil.
 //!
-//! A few slips say little of six numbers, so each is held to where the search starts (a row of the soil table) as loosely as
-//! such numbers are known (Tikhonov's regularisation), and the intervals say what the measured slips add.
+//! A few slips hardly determine six numbers, so each is held to where the search starts (a row of the soil table) as loosely
+//! as such numbers are known (Tikhonov's regularisation), and the intervals show the contribution of the measured slips.
 
 use crate::interval::{Interval, spread};
 use crate::least_squares::{Free, least_squares};
@@ -16,7 +16,7 @@ pub struct Wheel {
     pub radius: f64,
     /// Width, m.
     pub width: f64,
-    /// Vertical load where the measurements do not tell it, N.
+    /// Vertical load where the measurements do not contain it, N.
     pub load: Option<f64>,
 }
 
@@ -73,7 +73,7 @@ type WheelNumbers = [f64; 6];
 /// Prior width about the start.
 const PRIOR: WheelNumbers = [3.0, 0.5, 0.6, 800.0, 0.3, 1.0];
 
-/// Keys of a scenario, and what they are.
+/// Keys of a scenario, and their meanings.
 const KEYS: [(&str, &str); 6] = [
     ("k_phi", "frictional modulus, N/m^(n+2); k_c = 0, one width does not tell it"),
     ("n", "exponent of a wheel without slip"),
@@ -108,7 +108,7 @@ pub struct WheelFit {
     at: WheelNumbers,
 }
 
-/// Start of the search, beside known properties of the soil: exponent and modulus k_φ of its row.
+/// Start of the search, in addition to known properties of the soil: exponent and modulus k_φ of its row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelStart {
     /// Exponent.
@@ -158,7 +158,7 @@ pub fn fit_wheel(
     let numbers = spread(&answers, &at).into_iter().enumerate().map(|(k, interval)| {
         let (key, help) = KEYS[k];
         let ends = [interval.low.max(low[k]), interval.high.min(high[k])].map(|x| in_scenario(k, x));
-        // what is not finite stays unknown
+        // a value that is not finite stays unknown
         let known = interval.low.is_finite() && interval.high.is_finite();
         let [low, high] = if known { ends } else { [f64::NAN; 2] };
         WheelNumber { key, value: in_scenario(k, at[k]), interval: Interval { low, high }, help }
@@ -190,7 +190,7 @@ fn rim(wheel: &Wheel, x: &[f64], slip: f64) -> Rim {
     }
 }
 
-/// Stiffness with which soil of this law springs back where nobody gives it, Pa/m.
+/// Default stiffness with which soil of this law springs back, Pa/m.
 fn unloading(k_phi: f64, n: f64) -> f64 {
     // a built-in law always answers
     PressureLaw::Bekker(Bekker { k_c: 0.0, k_phi, n }).unloading().unwrap_or(f64::INFINITY)

@@ -6,18 +6,18 @@ use crate::{PressureLaw, SoilExpressions};
 use serde_json::{Map, Value};
 use terraglue_subsystem::{Advice, Config};
 
-/// Depth up to which nobody minds that the elastic line stands for the law, m.
+/// Depth up to which the elastic line may replace the law without advice, m.
 const UNNOTICED: f64 = 1e-4;
 /// Relative difference of gravities from which on they are different ones.
 const SAME_GRAVITY: f64 = 0.01;
 const STIFFNESS: &str = "elastic_stiffness_pa_m";
 
-/// Advice on the table of a soil under `gravity` (m/s²) and on those of its `regions`: whose each is, as messages say it, and
-/// the numbers that it has in place of those of the table.
+/// Advice on the table of a soil under `gravity` (m/s²) and on those of its `regions`: the owner of each, as named in
+/// messages, and the numbers that it has in place of those of the table.
 ///
-/// Told are soils whose law the elastic line of unloading changes at depths that matter, since it stands for the start of a
-/// power law and bounds the slope of any (of laws that are modules the soil speaks itself), and soils whose moduli were measured
-/// under another gravity and are not scaled.
+/// It names soils whose law the elastic line of unloading changes at depths that matter, since it stands for the start of a
+/// power law and bounds the slope of any (the soil itself checks laws that are modules), and soils whose moduli were
+/// measured under another gravity and are not scaled.
 pub fn advice(config: &Config, regions: &[(String, Map<String, Value>)], gravity: f64) -> Vec<Advice> {
     let merged = |(whose, numbers): &(String, Map<String, Value>)| {
         Some((whose.clone(), SoilParameters::of_region(config, numbers).ok()?))

@@ -16,8 +16,8 @@ pub(crate) fn is_building_up(cohesion: f64, pressure: f64) -> bool {
     BUILD_UP * pressure < cohesion
 }
 
-/// A stress with its derivatives by pressure and slip, as the law `at` a pressure gives it but for what it holds without
-/// pressure, `cohesion` once it has slipped.
+/// A stress with its derivatives by pressure and slip, as the law `at` a pressure gives it, except for its strength
+/// without pressure, `cohesion` once it has slipped.
 #[inline]
 pub(crate) fn built_up(
     cohesion: f64,

@@ -1,4 +1,4 @@
-//! First loading under a contact of one size: what a law of pressure and sinkage answers, for all nodes below it.
+//! First loading under a contact of one size: the answer of a law of pressure and sinkage, for all nodes below it.
 
 use crate::expression::Program;
 use crate::plugin::PluginLaw;

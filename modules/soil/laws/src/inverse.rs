@@ -3,16 +3,16 @@
 
 use terraglue_subsystem::Result;
 
-/// Smallest depth at which a law is looked at, m.
+/// Smallest depth at which a law is evaluated, m.
 const SHALLOWEST: f64 = 1e-9;
-/// Largest depth that a law is asked for, m.
+/// Largest depth at which a law is evaluated, m.
 const DEEPEST: f64 = 1e3;
 /// Steps at most.
 const STEPS: usize = 200;
 /// Newton steps after which every other step is a bisection: where a law bends sharply Newton's jump to and fro.
 const QUICK: usize = 20;
 
-/// Whether step number `k` halves the bracket, whatever Newton says.
+/// Whether step number `k` halves the bracket, regardless of Newton.
 fn halves(k: usize) -> bool {
     k >= QUICK && k.is_multiple_of(2)
 }

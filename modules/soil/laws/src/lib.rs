@@ -1,7 +1,7 @@
 //! Pressure and shear laws of soils with tangents and inverses, evaluated over batches of nodes.
 //!
-//! A node is a depth, a largest depth and a shear displacement; what lies around it is the business of whoever calls. SI
-//! units; depths and pressures grow into the soil, pressure is never negative.
+//! A node is a depth, a largest depth and a shear displacement; its surroundings are up to the caller. SI units; depths
+//! and pressures grow into the soil, pressure is never negative.
 //!
 //! * Pressure and sinkage: the trait [`PressureSinkage`], one file per law (`bekker.rs`, `reece.rs`, `bearing_capacity.rs`);
 //!   [`PressureCurve`] adds elastic unloading, and slip sinkage is in `slip_sinkage.rs`.

@@ -10,8 +10,8 @@ use crate::shear::ShearLaw;
 use crate::strength::Strength;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// Density where a scenario is silent, kg/m³: the upper 15 cm of lunar soil (Carrier, Olhoeft and Mendell 1991, Lunar
-/// Sourcebook, table 9.4).
+/// Default density, kg/m³: the upper 15 cm of lunar soil (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table
+/// 9.4).
 pub const DEFAULT_DENSITY: f64 = 1500.0;
 
 /// Parameters of a soil; the names are the keys of a scenario and the columns of `models/soils.csv`.
@@ -37,7 +37,7 @@ pub struct SoilParameters {
     pub K_m: f64,
     /// Bulk density where known, kg/m³.
     pub density_kg_m3: Option<f64>,
-    /// Stiffness of unloading and reloading, Pa/m; `None`: as [`PressureLaw::unloading`] says.
+    /// Stiffness of unloading and reloading, Pa/m; `None`: that of [`PressureLaw::unloading`].
     pub elastic_stiffness_pa_m: Option<f64>,
     /// Acceleration of gravity, m/s²: makes a weight of the density.
     pub gravity: f64,
@@ -307,7 +307,7 @@ impl SoilParameters {
     ) -> Result<Config> {
         let mut all: serde_json::Map<_, _> = serde_json::from_str(&config.to_json())
             .map_err(|e| Error::Refused(format!("the soil's table cannot be read again: {e}")))?;
-        // what a region does not know is not known of its soil
+        // a density that a region does not give is unknown for its soil
         all.remove("density_kg_m3");
         all.remove("measured_gravity_m_s2");
         all.remove("wall_cohesion_pa");

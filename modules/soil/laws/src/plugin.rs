@@ -1,7 +1,7 @@
-//! A law that comes as a module of its own, in use by one soil: calls over nodes, and checks of what comes back.
+//! A law that comes as a module of its own, in use by one soil: calls over nodes, and checks of the answers.
 //!
-//! A law that fails, or answers what no soil does, is an error of the call in which it did. How long a step the law can answer
-//! for is no failure: the smallest of its answers is kept until the end of a trial, see [`PluginLaw::reaches`].
+//! A law that fails, or gives an impossible answer, is an error of that call. How long a step the law can answer for is no
+//! failure: the smallest of its answers is kept until the end of a trial, see [`PluginLaw::reaches`].
 
 use crate::shear_strength::{YieldAnswer, YieldNodes};
 use std::sync::Arc;
@@ -79,7 +79,7 @@ impl PluginLaw {
         self.used.h.store(h.to_bits(), Relaxed);
     }
 
-    /// The committed state has changed: what the law has said of the length of a step holds no more.
+    /// The committed state has changed: the law's limit of the step no longer holds.
     pub fn forget(&self) {
         self.used.longest.store(f64::INFINITY.to_bits(), Relaxed);
     }
@@ -147,7 +147,7 @@ impl PluginLaw {
     /// Pressures, slopes, unloaded surfaces and new states by a law with a state.
     ///
     /// # Errors
-    /// The law has failed, or answered what no soil does.
+    /// The law has failed, or given an impossible answer.
     pub fn kept(
         &self,
         b: f64,

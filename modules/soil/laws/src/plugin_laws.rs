@@ -33,7 +33,7 @@ impl PluginShear {
     /// Takes the shear law of a module into use.
     ///
     /// # Errors
-    /// The law has failed, or answered what no soil does.
+    /// The law has failed, or given an impossible answer.
     pub fn new(law: PluginLaw) -> Result<Self> {
         let state = [0.0; MOST_LAW_STATE];
         let state = &state[..law.state_doubles()];

@@ -54,7 +54,7 @@ impl PressureCurve {
     }
 
     /// The curve of a law that is no power law. `gentle`: it is nowhere stiffer than unloading beyond the elastic limit. A law
-    /// with a state answers for unloading, too, and is asked by [`PressureCurve::keeper`] alone.
+    /// with a state covers unloading, too, and is evaluated through [`PressureCurve::keeper`] alone.
     ///
     /// # Errors
     /// The law has no answer.

@@ -66,8 +66,8 @@ impl PressureLaw {
         self.curve_in_slip(b, k_u, &SlipSinkage::None, 0.0)
     }
 
-    /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper
-    /// as `sinkage` says.
+    /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper by
+    /// `sinkage`.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.
@@ -82,8 +82,8 @@ impl PressureLaw {
         }
     }
 
-    /// Stiffness of unloading and reloading where nobody gives one, Pa/m: 4.4 times that of first loading down to 2 cm
-    /// under a contact of 5 cm, as Wong (1984) measured in sand.
+    /// Default stiffness of unloading and reloading, Pa/m: 4.4 times that of first loading down to 2 cm under a contact
+    /// of 5 cm, as Wong (1984) measured in sand.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.

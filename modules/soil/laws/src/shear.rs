@@ -90,7 +90,7 @@ impl ShearLaw {
     /// The same with the yield stress of a module.
     ///
     /// # Errors
-    /// The module has failed, or answered what no soil does.
+    /// The module has failed, or given an impossible answer.
     pub fn with_plugin(self, law: PluginLaw) -> Result<Self> {
         Ok(Self { law: StrengthLaw::Plugin(PluginShear::new(law)?), ..self })
     }
@@ -125,7 +125,7 @@ impl ShearLaw {
     }
 
     /// Stress up to which soil under the pressure p (Pa) that has slipped by `slip` (m) is elastic, Pa; `mobilised` is
-    /// [`ShearLaw::mobilised`] of the slip, and `kept` what a law with a state remembers of the node.
+    /// [`ShearLaw::mobilised`] of the slip, and `kept` the memory of the node in a law with a state.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.
@@ -158,8 +158,8 @@ impl ShearLaw {
         self.respond_kept(state, &[], self.mobilised(state.slip), p, s)
     }
 
-    /// [`ShearLaw::respond`] where `mobilised` = [`ShearLaw::mobilised`] of the state's slip is known already; `kept` is what a
-    /// law with a state remembers of the node.
+    /// [`ShearLaw::respond`] where `mobilised` = [`ShearLaw::mobilised`] of the state's slip is known already; `kept` is the
+    /// memory of the node in a law with a state.
     ///
     /// # Errors
     /// The law, which is a module, has no answer.

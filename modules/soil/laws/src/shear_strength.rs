@@ -1,6 +1,6 @@
 //! The trait that each law of shear implements.
 //!
-//! A law says up to which stress soil is elastic; what happens there is the same for all of them, see [`crate::ShearLaw`].
+//! A law gives the stress up to which soil is elastic; yielding is the same for all of them, see [`crate::ShearLaw`].
 //! To add a law: a file of its name with a type that implements [`ShearStrength`], a variant of
 //! [`StrengthLaw`](crate::StrengthLaw), and its numbers in [`crate::SoilParameters`].
 
@@ -47,7 +47,7 @@ pub trait ShearStrength {
     fn friction(&self) -> f64;
 
     /// Stress (Pa) up to which soil under `pressure` (Pa) that has slipped by `slip` (m) is elastic, with its derivatives by
-    /// both; `kept` is what a law with a state remembers of the node.
+    /// both; `kept` is the memory of the node in a law with a state.
     ///
     /// # Errors
     /// The law has no answer.

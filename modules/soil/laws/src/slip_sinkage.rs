@@ -19,7 +19,7 @@ pub enum SlipSinkage {
 }
 
 impl SlipSinkage {
-    /// Modulus and exponent of a power law under the slip `slip`; what lies outside 0 … 1 counts as the nearer end.
+    /// Modulus and exponent of a power law under the slip `slip`; a slip outside 0 … 1 counts as the nearer end.
     pub fn apply(&self, modulus: f64, n: f64, slip: f64) -> (f64, f64) {
         let s = slip.clamp(0.0, 1.0);
         match *self {

@@ -6,12 +6,12 @@ use terraglue_subsystem::Result;
 
 /// Slopes over that of unloading up to which a law need not be looked at again for every size of a contact.
 const GENTLE: f64 = 0.9;
-/// Sizes of contacts for which a law is looked at, m.
+/// Sizes of contacts for which a law is checked, m.
 const SIZES: [f64; 12] = [0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0];
 
-/// Size of a small foot (m), under which a law is looked at for [`Softened`].
+/// Size of a small foot (m), under which a law is checked for [`Softened`].
 pub const SMALL_CONTACT: f64 = 0.02;
-/// Sinkage beyond which the plate tests behind the laws say nothing, m.
+/// Sinkage up to which the plate tests behind the laws are valid, m.
 pub const DEEPEST_TESTED: f64 = 0.3;
 
 /// A law that is stiffer than unloading above [`DEEPEST_TESTED`] under a contact of size [`SMALL_CONTACT`].
@@ -61,7 +61,7 @@ impl PressureLaw {
         for k in 1..=steps {
             steepest = steepest.max((own.virgin(z(k))? - own.virgin(z(k - 1))?) / (z(k) - z(k - 1)));
         }
-        // rounded up to the two digits that are told
+        // rounded up to the two digits of the message
         let needed = 1.1 * steepest.max(STIFFEST * k_u) / STIFFEST;
         Ok(Some(Softened { from, needed, stiffness: k_u }))
     }

@@ -1,14 +1,14 @@
-//! First loading goes on straight where a law that somebody wrote would be stiffer than unloading.
+//! First loading goes on straight where a user's law would be stiffer than unloading.
 //!
-//! Soil keeps of the work of first loading what its elastic line holds: ∫(1 − p'/k_u)·p dz becomes heat. Where p' > k_u this
-//! is negative, so that pressing and releasing would yield energy. The pressure is therefore the largest one below the law
-//! whose slope stays below k_u: from where the law is too steep it goes on along a line, up to where the law comes back to it.
+//! Soil keeps the part of the work of first loading under its elastic line: ∫(1 − p'/k_u)·p dz becomes heat. Where p' > k_u
+//! this is negative, so that pressing and releasing would yield energy. The pressure is therefore the largest one below the
+//! law whose slope stays below k_u: where the law is too steep it follows a line, up to where the law comes back to it.
 
 /// Largest slope of first loading over that of unloading.
 pub(crate) const STIFFEST: f64 = 0.99;
 /// Lines of a law; the last one does not end.
 const LINES: usize = 3;
-/// Depths at which a law is looked at beyond the elastic limit, denser near 0.
+/// Depths at which a law is evaluated beyond the elastic limit, denser near 0.
 const DEPTHS: usize = 63;
 /// The deepest of them, m: no node remembers more.
 const DEEPEST: f64 = 1.0;
@@ -17,7 +17,7 @@ const SHALLOWEST: f64 = 1e-9;
 /// Halvings of the distance between two depths.
 const HALVINGS: usize = 60;
 
-/// Pressures (Pa) and slopes (Pa/m) of a law at several depths (m); what is not finite ends the look.
+/// Pressures (Pa) and slopes (Pa/m) of a law at several depths (m); a value that is not finite ends the search.
 type Look<'a> = dyn Fn(&[f64], &mut [f64], &mut [f64]) + 'a;
 
 #[derive(Clone, Copy, Debug, PartialEq)]

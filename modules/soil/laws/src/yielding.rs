@@ -5,12 +5,12 @@ use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes};
 use crate::strength_law::StrengthLaw;
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
-/// Nodes whose yield stress is asked together.
+/// Nodes whose yield stress is evaluated together.
 const CHUNK: usize = 64;
 /// Newton steps until bisection has the last word.
 const STEPS: usize = 60;
 /// Relative change of a slip at which Newton has arrived: the error left is of the order of its square, that of the
-/// derivatives, which were asked for before it, of its own.
+/// derivatives, which were evaluated before it, of its own.
 const CONVERGED: f64 = 1e-10;
 /// Change of a slip, relative to the displacement, that is nothing but the rounding of the stress.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;

@@ -1,5 +1,5 @@
-//! Cycles of first loading and elastic unloading under laws that somebody wrote: never stiffer than unloading, so that no
-//! cycle yields energy.
+//! Cycles of first loading and elastic unloading under users' laws: never stiffer than unloading, so that no cycle yields
+//! energy.
 
 use proptest::prelude::*;
 use terraglue_soil_law::{PressureCurve, PressureLaw, SoilExpressions, SoilParameters, first_loading};

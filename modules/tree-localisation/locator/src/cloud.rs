@@ -1,4 +1,4 @@
-//! Reads point clouds as scanners tell them: messages `foxglove.PointCloud` in Protocol Buffers, of which x, y and z are needed, and time,
+//! Reads the point clouds of scanners: messages `foxglove.PointCloud` in Protocol Buffers, of which x, y and z are needed, and time,
 //! ring, subsystem and body are read where they are.
 
 use std::fmt;

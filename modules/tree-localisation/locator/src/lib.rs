@@ -1,8 +1,8 @@
 //! Where a machine is among trees while it drives: from streams of scanners, odometry and GNSS to a pose and its bound.
 //!
 //! * `settings.rs`: parameters.
-//! * `variables.rs`: inputs, outputs, what can be changed while a run goes on.
-//! * `cloud.rs`: point clouds as scanners tell them.
+//! * `variables.rs`: inputs, outputs, settings that can be changed during a run.
+//! * `cloud.rs`: point clouds of scanners.
 //! * `own.rs`: where the machine itself is.
 //! * `look.rs`: from messages to trees around the machine.
 //! * `shown.rs`: overlays and the message of a match.

@@ -34,7 +34,7 @@ pub struct TreeLocator {
     slots: Slots<Saved>,
 }
 
-/// What a slot keeps: the state, the values of the table, and the map.
+/// Content of a slot: the state, the values of the table, and the map.
 type Saved = (State, Vec<f64>, Option<Arc<Matcher>>);
 
 /// State from step to step, apart from the map.
@@ -46,7 +46,7 @@ struct State {
     track: TrackState,
     /// Odometry up to which the tracker has moved; none: before the first step.
     odometry: Option<Pose2>,
-    /// Matches of the last scan, and when the stream told of them last, s.
+    /// Matches of the last scan, and when the stream reported them last, s.
     shown: Shown,
     told_at: Option<f64>,
 }
@@ -105,7 +105,7 @@ impl TreeLocator {
         })
     }
 
-    /// What odometry shows.
+    /// Pose of the odometry.
     fn odometry(&self) -> Pose2 {
         let [x, y, yaw] = [id::ODOMETRY_X, id::ODOMETRY_Y, id::ODOMETRY_YAW].map(|k| self.table.value(k));
         Pose2 { x, y, yaw: wrapped(yaw) }
@@ -152,7 +152,7 @@ impl TreeLocator {
         Ok(sighting)
     }
 
-    /// What a scan says of the pose.
+    /// Updates the pose with the trees of a scan.
     fn locate(&mut self, matcher: Arc<Matcher>, sighting: &Sighting, time: f64) {
         let mut tracker = Tracker::new(matcher, self.settings.rules).with_state(self.state.track.clone());
         let now = self.odometry();
@@ -235,7 +235,7 @@ impl TreeLocator {
         shown.iter().for_each(|(id, value)| self.table.show(*id, *value));
     }
 
-    /// By how much the pose is wrong, where that is told.
+    /// The error of the pose, where the truth is known.
     fn judge(&mut self, world: &dyn World, is_scan: bool) -> Result {
         let true_pose = self.settings.mount.state(world, world.time())?.world_from_body;
         self.state.shown.height = true_pose.position[2];

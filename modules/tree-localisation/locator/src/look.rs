@@ -70,7 +70,7 @@ impl Looker {
         Ok(())
     }
 
-    /// What is left out of a scan. The boxes around the bodies are those of now.
+    /// The filter of a scan, with the present boxes around the bodies.
     fn filter(&mut self, settings: &mut Settings, mask: usize, world: &dyn World) -> Result<Filter> {
         let frame = settings.mount.state(world, world.time())?.world_from_body;
         let own = match self.own.take() {
@@ -89,7 +89,7 @@ impl Looker {
     }
 }
 
-/// Points of a turn in the frame of the machine at its end: what it drove and turned meanwhile is taken out.
+/// Points of a turn in the frame of the machine at its end: its motion during the turn is removed.
 fn straightened(settings: &Settings, cloud: &Cloud, own: u32, [speed, turn_rate]: [f64; 2]) -> Scan {
     let base = settings.mount.body_from_sensor();
     let pose = cloud.pose.unwrap_or(Pose::IDENTITY);

@@ -1,4 +1,4 @@
-//! What people see of a match: overlays, and a message that a report can draw.
+//! A match as people see it: overlays, and a message that a report can draw.
 
 use nalgebra::Matrix3;
 use std::fmt::Write;

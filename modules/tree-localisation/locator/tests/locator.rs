@@ -1,4 +1,4 @@
-//! The module: point clouds as scanners tell them, messages that are none, scanners at the wrong place, states that are saved.
+//! The module: point clouds of scanners, messages that are none, scanners at the wrong place, states that are saved.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use proptest::prelude::*;

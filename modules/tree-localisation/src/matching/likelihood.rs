@@ -31,7 +31,7 @@ impl Default for MatchModel {
 /// Deviations beyond which a tree of the map explains nothing.
 const REACH: f64 = 3.5;
 
-/// A tree that is seen, with what its place is worth.
+/// A tree that is seen, with the accuracy of its place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub place: [f64; 2],

@@ -2,7 +2,7 @@
 //!
 //! * `likelihood.rs`: how much better a pose explains the trees around than chance does.
 //! * `pairs.rs`: poses from pairs of trees that are as far apart in both maps: the descriptor.
-//! * `prior.rs`: what is known before.
+//! * `prior.rs`: prior knowledge of the pose.
 //! * `refine.rs`: the pose that explains most, its covariance.
 //! * `verdict.rs`: located, ambiguous or lost: score, runner-up and expected number of false matches.
 
@@ -48,7 +48,7 @@ pub struct Matcher {
     model: MatchModel,
 }
 
-/// Poses that are looked at again, and those of them that are refined.
+/// Poses that are evaluated again, and those of them that are refined.
 const POLISHED: usize = 192;
 const REFINED: usize = 32;
 /// Poses nearer to each other than this are one, m and rad.
@@ -107,7 +107,7 @@ impl Matcher {
         verdict::answer(&likelihood, &found, prior)
     }
 
-    /// How much better a pose explains a local map than chance does, nats, for as many poses as are asked for.
+    /// How much better a pose explains a local map than chance does, nats, for any number of poses.
     pub fn scores(&self, local: &[LocalTree]) -> impl Fn(&Pose2) -> f64 {
         let likelihood = Likelihood::new(&self.map, &self.model, local);
         move |pose| likelihood.score(pose)

@@ -70,7 +70,7 @@ impl PairIndex {
     }
 }
 
-/// Poses that are looked at, at most.
+/// Poses that are evaluated, at most.
 const MOST_POSES: usize = 100_000;
 /// Local pairs that are tried, at least and at most.
 const LOCAL_PAIRS: [usize; 2] = [16, 60];
@@ -132,7 +132,7 @@ fn local_pairs(trees: &[Seen], longest: f64) -> Vec<(usize, usize, f64)> {
             }
         }
     }
-    // longest in relation to what it is worth first
+    // longest in relation to the deviations first
     let worth = |(i, j, d): &(usize, usize, f64)| d / (trees[*i].deviation + trees[*j].deviation);
     all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     let most = (2 * LOCAL_PAIRS[1]).div_ceil(trees.len().max(1)) + 1;

@@ -1,11 +1,11 @@
-//! What is known of a pose before it is searched.
+//! Prior knowledge of a pose, before it is searched.
 
 use crate::pose::{Pose2, wrapped};
 
 /// By how much an area that is searched is larger than the prior, so that a wrong prior is noticed.
 pub(super) const SLACK: f64 = 1.5;
 
-/// What is known of the pose before.
+/// Prior knowledge of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Place, m.

@@ -1,4 +1,4 @@
-//! The pose that explains most: trees and those of the map are assigned by what they explain, then both maps are laid on each other by
+//! The pose that explains most: trees are assigned to those of the map by likelihood, then both maps are laid on each other by
 //! least squares, again and again (expectation and maximisation: A. P. Dempster, N. M. Laird and D. B. Rubin, 1977).
 
 use super::likelihood::Likelihood;
@@ -6,7 +6,7 @@ use super::verdict::Found;
 use crate::pose::{Pose2, wrapped};
 use nalgebra::Matrix3;
 
-/// Rounds at most, and what a pose moves in the last one, m.
+/// Rounds at most, and motion of the pose in the last one, m.
 const ROUNDS: usize = 25;
 const STILL: f64 = 1e-4;
 

@@ -1,8 +1,8 @@
 //! Whether to believe a pose: located, ambiguous or lost.
 //!
 //! Under chance the ratio of likelihoods of any one pose has the mean 1, so it exceeds e^L with a probability of at most e^−L (A. A.
-//! Markov; as in A. Wald's test, 1945): of the n poses that could be told apart in the area that was searched, n·e^−L are
-//! expected to do so. That bounds what chance does. It says nothing of a stand that repeats itself: that is what the runner-up tells.
+//! Markov; as in A. Wald's test, 1945): of the n distinguishable poses in the area that was searched, n·e^−L are
+//! expected to do so. That bounds chance. It does not cover a stand that repeats itself: the runner-up does.
 
 use super::likelihood::Likelihood;
 use super::prior::{Prior, SLACK};
@@ -11,7 +11,7 @@ use nalgebra::Matrix3;
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
-/// Fewest trees that can tell a place.
+/// Fewest trees that can identify a place.
 pub(super) const FEWEST: usize = 4;
 /// False matches that are expected at most of a pose that is believed.
 const FALSE_MATCHES: f64 = 1e-3;
@@ -69,7 +69,7 @@ impl std::ops::Deref for Located {
 /// Why a pose is not believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reason {
-    /// Fewer trees than a place can be told from.
+    /// Fewer trees than can identify a place.
     TooFewTrees {
         /// Trees that were seen.
         seen: usize,
@@ -90,7 +90,7 @@ pub enum Reason {
         /// That of the next one.
         runner_up: f64,
     },
-    /// The best pose is outside of what was known before.
+    /// The best pose is outside of the prior.
     OutsidePrior {
         /// Its score, nats.
         score: f64,
@@ -128,7 +128,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What poses, the best first, are worth.
+/// Verdict on the poses, the best first.
 pub(super) fn answer(likelihood: &Likelihood, found: &[Found], prior: Option<&Prior>) -> Answer {
     let Some(best) = found.first().filter(|f| f.score > 0.0) else {
         return Answer::Lost(Reason::NothingFits);
@@ -150,7 +150,7 @@ pub(super) fn answer(likelihood: &Likelihood, found: &[Found], prior: Option<&Pr
     }
 }
 
-/// Poses that can be told apart in the area that is searched.
+/// Number of distinguishable poses in the area that is searched.
 fn poses(likelihood: &Likelihood, prior: Option<&Prior>) -> f64 {
     let [low, high] = likelihood.map.bounds();
     let whole = (high[0] - low[0]).max(1.0) * (high[1] - low[1]).max(1.0);

@@ -220,7 +220,7 @@ impl MassChain {
         out.reached = step.t + step.h;
     }
 
-    /// The force on itself that makes X what it is given, from the free motion.
+    /// The force on itself that gives the prescribed X, from the free motion.
     fn solve_for_force(&mut self, step: &Step, x: &[f64]) -> Result {
         let n = step.n as usize;
         self.force.clear();

@@ -14,7 +14,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// The place in the body of what lies at `world`.
+    /// The place in the body of the point `world`.
     pub fn local(body: usize, world: [f64; 2], q: impl Fn(usize) -> f64) -> [f64; 2] {
         let (s, c) = libm::sincos(q(3 * body + 2));
         let d = [world[0] - q(3 * body), world[1] - q(3 * body + 1)];
@@ -112,7 +112,7 @@ struct Spring {
     rest: f64,
 }
 
-/// What does not change over the run.
+/// Constant data of the run.
 #[derive(Clone, Debug)]
 pub struct Mechanism {
     /// Masses, kg.

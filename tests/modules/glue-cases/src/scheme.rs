@@ -96,7 +96,7 @@ impl Scheme {
         (self.alpha_f * c.qdd - self.alpha_m * c.a) / (1.0 - self.alpha_m)
     }
 
-    /// What the step makes of a coordinate before q̈⁺ is known.
+    /// The prediction of a coordinate before q̈⁺ is known.
     pub fn predict(&self, c: &Coordinate, h: f64) -> Linear {
         let known = self.known(c);
         Linear {

@@ -204,7 +204,7 @@ impl Subsystem for SoilColumns {
         for (p, port) in step.ports.iter().enumerate() {
             let answer = self.under_motion(port, p, partner.x, None);
             let z = self.depth_now(port) - partner.x[port.first as usize];
-            // the work of its own law, whatever it was told
+            // the work of its own law, whatever the wrench passed to it
             let own = [answer.t_n, answer.t_t[0], answer.t_t[1]];
             let forces = port.components().filter(|(_, c)| *c < 3);
             let work: f64 = forces.map(|(i, c)| -own[c] * partner.x[i]).sum();

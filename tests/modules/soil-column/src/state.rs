@@ -36,7 +36,7 @@ impl Column {
     }
 }
 
-/// What a port answered in the last trial.
+/// Answer of a port in the last trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Answer {
     pub(crate) x_n: f64,

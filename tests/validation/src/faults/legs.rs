@@ -4,7 +4,7 @@ use super::walk::{Place, Walk};
 use crate::process::Outcome;
 use terraglue_numerics::extremes::{larger, smaller};
 
-/// What is run: name in the table, name in the picture, scenario, options.
+/// Runs: name in the table, name in the picture, scenario, options.
 const CASES: [(&str, &str, &str, &[&str]); 4] = [
     ("undisturbed", "undisturbed", "torque", &["event=[]"]),
     ("torque of LF_j2 and LF_j3 lost", "torque lost", "torque", &[]),
@@ -15,7 +15,7 @@ const CASES: [(&str, &str, &str, &[&str]); 4] = [
 /// Step, s, and number of steps from record to record: the same times with either step.
 const STEPS: [(&str, &str); 2] = [("0.001", "10"), ("0.0005", "20")];
 
-/// What a fault moves, in parts of what halving the step moves of the same walk, is at least this.
+/// Smallest ratio of the change by a fault to the change by halving the step of the same walk.
 const LEAST_RATIO: f64 = 5.0;
 
 /// The four walks.
@@ -73,7 +73,7 @@ impl Legs {
         Ok(text)
     }
 
-    /// Whether each fault moves path and heading by [`LEAST_RATIO`] times what halving the step moves of the same walk.
+    /// Whether each fault moves path and heading by [`LEAST_RATIO`] times the change by half the step.
     pub fn hold(&self) -> Outcome {
         for k in 1..CASES.len() {
             let [(path, heading), (half_path, half_heading)] = self.effects(k)?;

@@ -1,6 +1,6 @@
 //! `cargo xtask faults`: runs the fault scenarios and writes the tables and the picture of `docs/faults.md`.
 //!
-//! The walks are run as a user runs them, by the program; what the page says is computed from their
+//! The walks are run as a user runs them, by the program; the figures of the page are computed from their
 //! `variables.csv` and `summary.json` alone.
 
 mod crater;

@@ -32,7 +32,7 @@ pub struct Walk {
 }
 
 impl Walk {
-    /// Runs a scenario with `--set` options and reads what it recorded of `robot.body`.
+    /// Runs a scenario with `--set` options and reads the recorded motion of `robot.body`.
     pub fn run(place: &Place, name: &str, scenario: &str, set: &[String]) -> Outcome<Self> {
         eprintln!("walk `{name}`: {scenario} {}", set.join(" "));
         let folder = place.folder.join(name);
@@ -86,7 +86,7 @@ impl Walk {
         Ok((1e3 * path, heading))
     }
 
-    /// What was recorded at the time `t` (s), between records on a straight line.
+    /// The recorded value at the time `t` (s), between records on a straight line.
     fn between(&self, t: f64, values: &[f64]) -> f64 {
         let next = self.t.partition_point(|own| *own < t).clamp(1, self.t.len() - 1);
         let share = (t - self.t[next - 1]) / (self.t[next] - self.t[next - 1]);

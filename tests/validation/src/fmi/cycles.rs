@@ -50,7 +50,7 @@ pub fn figures(folder: &Path, quick: bool) -> Outcome<Vec<Figure>> {
     ])
 }
 
-/// What a process holds.
+/// Resources of a process.
 #[derive(Default)]
 struct Holdings {
     files: f64,
@@ -62,7 +62,7 @@ struct Holdings {
 impl Holdings {
     fn now() -> Self {
         let count = |path: &str| std::fs::read_dir(path).map_or(0, Iterator::count) as f64;
-        // Folders of FMUs that nobody holds: those in use are locked, by this or by another process.
+        // Folders of FMUs that no process holds: those in use are locked, by this or by another process.
         let left = |e: &std::fs::DirEntry| {
             let named = e.file_name().to_string_lossy().starts_with("terraglue-fmu-");
             let lock = std::fs::File::open(e.path().join(".terraglue-lock"));

@@ -4,7 +4,7 @@ use crate::process::{Outcome, command, must, write};
 use std::path::{Path, PathBuf};
 use terraglue_fmi::export::{Compression, Content, pack};
 
-/// What every FMU shares. `calc` gives outputs from all values, `step` goes on by h.
+/// Common code of the FMUs. `calc` gives outputs from all values, `step` goes on by h.
 const FRAME: &str = r"
 #include <math.h>
 #include <stdlib.h>
@@ -52,14 +52,14 @@ int fmi2GetBooleanStatus(Fmu *u, int k, int *x) { return 3; }
 int fmi2GetStringStatus(Fmu *u, int k, const char **x) { return 3; }
 "#;
 
-/// What an FMU without derivatives answers.
+/// Answer of an FMU without derivatives.
 const NO_SLOPE: &str = "int fmi2GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, double *x) { return 3; }";
 
 /// A variable: name, role (`p`arameter, `i`nput, `o`utput, output of a `s`tate, which no input is seen in at once) and start value.
 pub type Variable<'a> = (&'a str, char, f64);
 
 /// Builds an FMU that knows the derivative of its last output by its first input, `slope` in C, and counts in the output
-/// before it how often it was asked.
+/// before it how often it was evaluated.
 pub fn build_with_slope(
     folder: &Path,
     name: &str,

@@ -10,7 +10,7 @@ pub const NOT_SET: &str = "TERRAGLUE_FMU_DIR is not set";
 /// Reference FMUs that have no table of their own.
 const WITHOUT_TABLE: [&str; 2] = ["Clocks", "Roberts"];
 
-/// What lies in the folder, in the order of the paths.
+/// Files of the folder, in the order of the paths.
 pub struct Fmus {
     /// Reference FMUs.
     pub reference: Vec<PathBuf>,

@@ -62,7 +62,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     ])
 }
 
-/// How often each of two FMUs was asked for its directional derivatives by a loop that needs them.
+/// How often a loop evaluated the directional derivatives of each of two FMUs.
 fn asked(folder: &Path) -> Outcome<f64> {
     // outputs in steps of 1e-4, which no difference of 1e-7 can see
     let coarse = |name: &str, calc: &str, slope: &str| {
@@ -90,7 +90,7 @@ fn scenario(all: &[(&str, &str)], connections: &[(&str, &str)]) -> String {
     format!("{HEAD}{fmus}{}", connect.collect::<String>())
 }
 
-/// What is left of the equations for the outputs `y` of all FMUs.
+/// Residual of the equations for the outputs `y` of all FMUs.
 fn solved(
     folder: &Path,
     all: &[(&str, &str)],

@@ -1,5 +1,5 @@
-//! What users of FMUs expect of a master and found broken: time grids of solvers, tolerances, whole arrays, processes apart, defects of
-//! descriptions, exports that prove themselves, gaps of glued bodies.
+//! Features that users of FMUs expect of a master and found broken: time grids of solvers, tolerances, whole arrays, processes apart,
+//! defects of descriptions, exports that prove themselves, gaps of glued bodies.
 
 use super::{built, testbed};
 use crate::process::{Outcome, command, must, root, write};
@@ -25,7 +25,7 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// An FMU of FMI 3.0 from the C beside this file.
+/// An FMU of FMI 3.0 from the C next to this file.
 fn three(place: &Path, name: &str, variables: &str, outputs: &str, macros: &[&str]) -> Outcome<PathBuf> {
     let grid = if macros.is_empty() { "" } else { " fixedInternalStepSize=\"0.01\"" };
     let library = place.join(format!("{name}.so"));
@@ -61,7 +61,7 @@ fn last(table: &Path) -> Outcome<Vec<f64>> {
     Ok(row.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
 }
 
-/// `lastSuccessfulTime` on a grid of 10 ms, in steps below it, beside it and above it.
+/// `lastSuccessfulTime` on a grid of 10 ms, in steps below it, off it and above it.
 fn own_grid(place: &Path, context: &Context) -> Outcome<Figure> {
     let y = "<Float64 name=\"y\" valueReference=\"5\" causality=\"output\"/>";
     let fmu = three(place, "grid", y, "<Output valueReference=\"5\"/>", &["-DGRID=0.01"])?;

@@ -14,11 +14,11 @@ const H: f64 = 1e-3;
 const SIDES: [[f64; 3]; 2] = [[1.0, 40.0, 0.3], [10.0, 1000.0, 0.1]];
 const X0: f64 = 0.1;
 
-/// Backward Euler: what the FMUs do, and one FMU with the sums.
+/// Backward Euler: the steps of the FMUs, and one FMU with the sums.
 const STEP: &str =
     "v[4] = (v[0] * v[4] + h * (v[5] - v[1] * v[3])) / (v[0] + h * v[2] + h * h * v[1]); v[3] += h * v[4];";
 
-/// `peers`: with other masters beside it.
+/// `peers`: with other masters for comparison.
 pub fn figures(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
     for (name, [m, k, d]) in ["left", "right"].iter().zip(SIDES) {
         let variables =

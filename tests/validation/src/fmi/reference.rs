@@ -56,7 +56,7 @@ fn roberts(context: &Context, fmu: &Path) -> Outcome<f64> {
     Ok(worst)
 }
 
-/// What a run writes to standard output.
+/// Standard output of a run.
 fn output(run: &mut std::process::Command) -> Outcome<String> {
     let done = run.output().map_err(|e| e.to_string())?;
     if !done.status.success() {
@@ -81,7 +81,7 @@ fn read(text: &str) -> ReferenceTable {
     (lines.next().unwrap_or_default(), lines.collect())
 }
 
-/// Runs an FMU on the times of its table. Rows beside a jump are left out; texts and whole numbers must be equal.
+/// Runs an FMU on the times of its table. Rows next to a jump are left out; texts and whole numbers must be equal.
 fn worst(context: &Context, fmu: &Path, table: &Path) -> Outcome<f64> {
     let (names, rows) = expanded(read(&std::fs::read_to_string(table).map_err(|e| e.to_string())?));
     let time = |row: &[String]| row.first().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN);

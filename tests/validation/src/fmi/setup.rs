@@ -22,7 +22,7 @@ const USUAL_STEP: f64 = 0.01;
 const SIZES: [f64; 5] = [1.0, 0.5, 0.1, 1.5, 3.0];
 const LONGEST: Duration = Duration::from_secs(120);
 
-/// What became of a run of either kind.
+/// Outcome of a run of either kind.
 enum Fate {
     Equal,
     Different(String),
@@ -114,7 +114,7 @@ fn fate(place: &Path, context: &Context, fmu: &Path, size: f64) -> Outcome<Fate>
     })
 }
 
-/// The last row of a table by the names of its columns, without what they begin with.
+/// The last row of a table by the names of its columns, without their prefix.
 fn last(path: &Path, prefix: &str) -> Outcome<BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_path(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let names = reader.headers().map_err(|e| e.to_string())?.clone();

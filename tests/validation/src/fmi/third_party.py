@@ -1,4 +1,4 @@
-"""An FMU in FMPy, from its start to its end, all outputs. It says, line by line:
+"""An FMU in FMPy, from its start to its end, all outputs. It prints, line by line:
 
 NONE reason              it is no FMU for co-simulation on this machine, and nothing was run
 EXPERIMENT start stop step on|off        the last word: with event mode, where an FMU with clocks offers it
@@ -24,7 +24,7 @@ def say(*words):
 
 
 def experiment(path, most):
-    """Start, stop and step that the FMU wants, s, with at most so many steps, and whether events are handled; none where it is
+    """Default start, stop and step of the FMU, s, with at most so many steps, and whether events are handled; none where it is
     not of our kind."""
     with zipfile.ZipFile(path) as archive:
         names = [name.replace("\\", "/") for name in archive.namelist()]

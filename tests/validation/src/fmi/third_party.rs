@@ -1,9 +1,9 @@
 //! FMUs of other tools in `TERRAGLUE_FMU_DIR`, each run here and by FMPy at the same times: every FMU that FMPy simulates runs
-//! here with the same last row, or is refused with what in it breaks the standard.
+//! here with the same last row, or is refused with its breach of the standard.
 //!
 //! Each run has a process of its own. A refusal counts as one where this project's reader refuses archive or description, or the
-//! library lacks what the standard asks for, or where it stops at a value that is no finite number and FMPy's own table holds
-//! one too; anything else that FMPy simulates and that does not run here is a failure, and so is a crash or a hang.
+//! library lacks functions that the standard requires, or where it stops at a value that is no finite number and FMPy's own
+//! table holds one too; anything else that FMPy simulates and that does not run here is a failure, and so is a crash or a hang.
 
 use super::cost::peers;
 use super::folder;
@@ -22,12 +22,12 @@ use terraglue_fmi::{Error, Fmu};
 const SCRIPT: &str = "tests/validation/src/fmi/third_party.py";
 /// Longest run of an FMU, s.
 const TIMEOUT_S: u64 = 300;
-/// The same for what watches it: the program's own limit comes first.
+/// The same for its watcher: the program's own limit comes first.
 const LONGEST: Duration = Duration::from_secs(TIMEOUT_S + 30);
 /// Largest difference of two numbers, relative to the larger of 1 and their size.
 const ACCURACY: f64 = 1e-9;
 
-/// What became of an FMU.
+/// Outcome of an FMU.
 #[derive(Debug, PartialEq)]
 enum Fate {
     /// It is no FMU for co-simulation on this machine.
@@ -37,13 +37,13 @@ enum Fate {
     OnlyHere,
     /// Why not here.
     Neither(String),
-    /// FMPy simulates it; it is refused here with what in it breaks the standard.
+    /// FMPy simulates it; it is refused here with its breach of the standard.
     Refused(String),
     /// FMPy simulates it; here it does not run.
     Failed(String),
 }
 
-/// What FMPy said of an FMU.
+/// Results of FMPy for an FMU.
 #[derive(Debug, Default)]
 struct Told {
     /// Start, stop and step, s, and whether with event mode; none: it is no FMU for co-simulation on this machine.
@@ -192,7 +192,7 @@ fn told(text: &str) -> Told {
     }
 }
 
-/// What in an FMU breaks the standard, where the refusal says so.
+/// Breach of the standard by an FMU, where the refusal names one.
 fn breach(fmu: &Path, complaint: &str, row: &Value) -> Option<String> {
     if let Err(why @ (Error::Archive { .. } | Error::Description { .. })) = Fmu::inspect(fmu) {
         return Some(why.to_string().replace(&format!("{}: ", fmu.display()), ""));

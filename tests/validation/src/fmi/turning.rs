@@ -1,4 +1,4 @@
-//! Two free bodies as two FMUs, glued beside their centres: the same as one robot of both on a ball joint, and their
+//! Two free bodies as two FMUs, glued off their centres: the same as one robot of both on a ball joint, and their
 //! angular momentum stays.
 
 use super::{built, fmus};
@@ -20,7 +20,7 @@ const JOINT: [f64; 3] = [0.4, 0.1, 0.9];
 const SPIN: [f64; 3] = [1.0, 2.0, -1.5];
 /// Frames of the links of the robot: that of the second is the joint.
 const FRAMES: [[f64; 3]; 2] = [SIDES[0].3, JOINT];
-/// Values that an FMU tells, in the order of its variables; then come force, moment, mass and inertia.
+/// Outputs of an FMU, in the order of its variables; then come force, moment, mass and inertia.
 const TOLD: [&str; 13] = ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
 
 /// Semi-implicit Euler; the orientation by the Cayley transform.
@@ -80,7 +80,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     ])
 }
 
-/// All that is told of a body whose centre of mass lies at `com` in it, for that centre.
+/// All outputs of a body whose centre of mass lies at `com` in it, for that centre.
 fn told(testbed: &Testbed, prefix: &str, com: Vector) -> [f64; 13] {
     let mut told = TOLD.map(|what| testbed.read(&format!("{prefix}.{what}")).unwrap_or(f64::NAN));
     let axis = [told[4], told[5], told[6]];

@@ -1,4 +1,4 @@
-//! Foreign code at work: a program in a folder of its own, ended when its time is over, and what it leaves behind.
+//! Foreign code at work: a program in a folder of its own, ended when its time is over, and the files it leaves behind.
 
 use crate::process::Outcome;
 use rustix::process::{Pid, Signal, kill_process};
@@ -19,9 +19,9 @@ const BURIAL: Duration = Duration::from_secs(2);
 pub struct Ended {
     /// Exit code; none: by a signal, or because its time was over.
     pub code: Option<i32>,
-    /// What it wrote to standard output.
+    /// Its standard output.
     pub output: String,
-    /// What it wrote to standard error.
+    /// Its standard error.
     pub errors: String,
     /// Files in its temporary folder and processes that outlived it.
     pub left: Vec<String>,

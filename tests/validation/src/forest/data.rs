@@ -11,7 +11,7 @@ use terraglue_tree_localisation::{
 
 /// Where the scanners of `synthetic` stand, m: 2 m above the ground.
 const EYE: [f64; 3] = [180.0, 120.0, 1.4053];
-/// Distance up to which stems are looked at, m.
+/// Distance up to which stems count, m.
 const WITHIN: f64 = 20.0;
 
 pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {
@@ -92,7 +92,7 @@ fn table(text: &str) -> Outcome<Vec<Vec<f64>>> {
     Ok(text.lines().skip(1).filter(|l| !l.trim().is_empty()).map(row).collect())
 }
 
-/// The map from the air tells too little without a prior: several poses explain the plot about as well.
+/// The map from the air is not sufficient without a prior: several poses explain the plot about as well.
 fn from_the_air(folder: &Path) -> Outcome<Vec<Figure>> {
     let air = table(&read(&folder.join("treematcher/Air_Positions.txt"))?)?;
     let ground = table(&read(&folder.join("treematcher/Ground_Positions.txt"))?)?;
@@ -116,7 +116,7 @@ fn from_the_air(folder: &Path) -> Outcome<Vec<Figure>> {
         air.len()
     );
     let mut out = vec![Figure::new("forest.data.treematcher.refused", refused, Limit::Equal(1.0), what)];
-    // with a prior around the best pose its runner-up is told
+    // with a prior around the best pose its runner-up is reported
     if let Answer::Ambiguous(_, all) = &alone
         && let Some(best) = all.first()
     {

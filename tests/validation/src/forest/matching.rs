@@ -1,4 +1,4 @@
-//! F8, F9, F13: who is kidnapped is found on a map of 450 stems, and what is believed is right.
+//! F8, F9, F13: a kidnapped machine is found on a map of 450 stems, and accepted poses are right.
 
 use super::{Context, Figure, Limit};
 use crate::parallel::in_parallel;
@@ -100,7 +100,7 @@ fn judged(
     out
 }
 
-/// What is believed of all trials.
+/// Accepted poses of all trials.
 pub fn integrity(sum: &Tally) -> Vec<Figure> {
     let accepted = sum.accepted.max(1) as f64;
     vec![

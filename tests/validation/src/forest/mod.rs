@@ -1,4 +1,4 @@
-//! Figures of the forest: the errors of a laser scanner, stems from its turns, their match with a map, drives, and what it costs; on
+//! Figures of the forest: the errors of a laser scanner, stems from its turns, their match with a map, drives, and the cost; on
 //! stands that are grown from a seed, and on the files of `TERRAGLUE_FOREST_DATA` where they are.
 
 mod data;

@@ -1,4 +1,4 @@
-//! F1: what a scanner tells against the numbers of its errors, over a million rays.
+//! F1: the ranges of a scanner against the parameters of its errors, over a million rays.
 
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;

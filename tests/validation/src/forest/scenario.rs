@@ -36,7 +36,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What a run told.
+/// Results of a run.
 struct Told {
     folder: PathBuf,
     time: Vec<f64>,

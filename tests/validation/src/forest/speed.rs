@@ -1,4 +1,4 @@
-//! F3, F14: what a turn and a match cost.
+//! F3, F14: cost of a turn and of a match.
 
 use super::matching::row;
 use super::{Context, Figure, Limit};

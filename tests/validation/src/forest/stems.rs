@@ -12,7 +12,7 @@ use terraglue_tree_localisation::{
     Detection, Detector, LocalTree, Pose2, SAME_TREE_M, Scan, Station, merged,
 };
 
-/// Distance up to which stems are looked at, m.
+/// Distance up to which stems count, m.
 const WITHIN: f64 = 20.0;
 /// Height of a scanner that stands alone, m.
 const ABOVE: f64 = 2.0;

@@ -1,8 +1,8 @@
-//! What the strategies answer to the rows of a table of values.
+//! Answers of the strategies to the rows of a table of values.
 
 use super::extrapolate::Limits;
 
-/// What the strategies say about the rows of one case.
+/// Answers of the strategies to the rows of one case.
 pub struct Answers {
     /// One per row.
     pub values: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Richardson's extrapolation of runs with halved steps: what a strategy and an integrator tend to as h → 0.
+//! Richardson's extrapolation of runs with halved steps: the limit of a strategy and an integrator as h → 0.
 
 use crate::process::Outcome;
 use terraglue_numerics::extremes::larger;

@@ -9,7 +9,7 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 use terraglue_numerics::extremes::smaller;
 
-/// A mass on a spring, as exact within a step as ½·h²·a: force, place, speed, how often it was asked, acceleration.
+/// A mass on a spring, as exact within a step as ½·h²·a: force, place, speed, evaluations of its derivative, acceleration.
 const VARIABLES: [Variable; 5] =
     [("f", 'i', 0.0), ("x", 'o', 1.0), ("v", 'o', 0.0), ("asked", 'o', 0.0), ("a", 'o', 0.0)];
 /// The rule of the step, with the share of h² that a force has in the place.
@@ -18,7 +18,7 @@ const RULES: [(&str, &str); 2] = [
     ("whole", "double a = (v[0] - K * v[1]) / M; v[2] += h * a; v[1] += h * v[2];"),
 ];
 
-/// What a run ends with.
+/// Results of a run.
 struct FmuRun {
     x: f64,
     evaluations: f64,
@@ -77,7 +77,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
                  of trials, m; {:.2} evaluations per step and {} trials for differences ({:.2} and {})",
                 told.evaluations, told.differences, by_trials.evaluations, by_trials.differences
             );
-            // an FMU that was not asked, or trials beside the derivatives, are a failure
+            // an FMU whose derivative was not evaluated, or trials in addition to the derivatives, are a failure
             let good = told.asked >= 1.0 && told.differences == 0;
             let off = if good { (told.x - by_trials.x).abs() } else { f64::NAN };
             all.push(Figure::new(format!("gluing.units.{rule}.{jacobian}"), off, Limit::AtMost(1e-8), what));

@@ -82,7 +82,7 @@ impl Foot {
     }
 }
 
-/// What happens from touch-down to lift-off.
+/// Figures from touch-down to lift-off.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fall {
     z_max: f64,

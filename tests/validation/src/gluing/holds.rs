@@ -1,4 +1,4 @@
-//! Levels of the condition, holds of the wrench, and stabilisation: what each leaves of gap, order and growth.
+//! Levels of the condition, holds of the wrench, and stabilisation: gap, order and growth with each.
 
 use super::extrapolate::steps_to;
 use super::fixture::{Setting, Tally, build, read, step, subsystem, wrench};
@@ -49,7 +49,7 @@ fn levels() -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// The angles at every 5 ms and what the run took.
+/// The angles at every 5 ms and the cost of the run.
 fn run(case: &MechanismCase, h: f64, gluing: &str) -> Outcome<(Vec<Vec<f64>>, Tally)> {
     let setting = Setting { gluing: gluing.into(), ..Setting::iterative(h, GRAVITY) };
     let mut testbed = build(&case.mechanism.cut(&setting, ALPHA))?;

@@ -1,4 +1,4 @@
-//! Two masses: where everything about gluing can be said in closed form.
+//! Two masses: everything about gluing in closed form.
 
 use super::extrapolate::steps_to;
 use super::fixture::{Setting, Tally, build, read, step, wrench};
@@ -193,7 +193,7 @@ fn fixed_point() -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// The other strategies of joints on what they can glue.
+/// The other strategies of joints on the cases they can glue.
 fn other_strategies() -> Outcome<Vec<Figure>> {
     let mut all = Vec::new();
     let tight = "tolerance = 1e-11";

@@ -102,7 +102,7 @@ fn setting(h: f64) -> Setting {
     Setting { gluing: String::new(), ..Setting::iterative(h, GRAVITY) }
 }
 
-/// The angles at multiples of `every` and what the run took.
+/// The angles at multiples of `every` and the cost of the run.
 fn run(case: &MechanismCase, h: f64, every: f64) -> Outcome<(Vec<Vec<f64>>, Tally)> {
     let mut testbed = build(&case.mechanism.cut(&setting(h), ALPHA))?;
     let (mut samples, mut tally, mut count) = (Vec::new(), Tally::default(), 0);

@@ -1,7 +1,7 @@
 //! Area `gluing`: the strategies against exact solutions, independent programs and each other.
 //!
 //! [`table`] evaluates `tests/reference/gluing/acceptance.csv`, or with `--table` any file of the same columns; the
-//! other parts measure what a table of values cannot say. Models, integrators, signs:
+//! other parts measure quantities beyond a table of values. Models, integrators, signs:
 //! `tests/reference/gluing/README.md`.
 
 mod answers;

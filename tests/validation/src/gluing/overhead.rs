@@ -1,8 +1,8 @@
-//! What the coordinator itself costs: an exchange of six patches less the time inside the subsystems.
+//! Cost of the coordinator itself: an exchange of six patches less the time inside the subsystems.
 //!
-//! Both subsystems are wrapped, so that the time of every `advance` is known from inside; what the exchange takes
-//! beyond it is the coordinator's. Thread CPU time would cost more to read than the exchange itself, so wall time is
-//! read and the quickest of many blocks taken: the machine may be busy.
+//! Both subsystems are wrapped, so that the time of every `advance` is known from inside; the rest of the exchange is
+//! the coordinator's. Thread CPU time would cost more to read than the exchange itself, so wall time is read and the
+//! quickest of many blocks taken: the machine may be busy.
 
 use super::super::timing::median;
 use super::fixture::Setting;

@@ -7,7 +7,7 @@ use crate::process::Outcome;
 pub struct Parameters<'a>(pub &'a str);
 
 impl<'a> Parameters<'a> {
-    /// What follows `key=`; the key stands at the start of a word.
+    /// The text after `key=`; the key stands at the start of a word.
     fn after(self, key: &str) -> Option<&'a str> {
         let mut from = 0;
         while let Some(at) = self.0[from..].find(key).map(|at| at + from) {

@@ -119,7 +119,7 @@ fn whole(setting: &Setting) -> String {
     setting.text() + &bodies("all", ALPHA, &links, &pins) + &parts[0].loads + &loads
 }
 
-/// What a run reached at the end.
+/// Results at the end of a run.
 struct End {
     /// Largest error of a multiplier in parts of the largest multiplier.
     multipliers: f64,

@@ -17,7 +17,7 @@ const STRATEGIES: [&str; 8] = [
     "monolithic",
 ];
 
-/// What a run of 0.1 s with h = 10 ms did.
+/// Results of a run of 0.1 s with h = 10 ms.
 struct StiffnessRun {
     /// When and why it ended early.
     failed: Option<String>,

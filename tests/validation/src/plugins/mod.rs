@@ -1,4 +1,4 @@
-//! Figures of the plugin interface: the checker, its broken modules, its time, and what it says of our own modules.
+//! Figures of the plugin interface: the checker, its broken modules, its time, and its verdict on our own modules.
 
 mod laws;
 mod newcomer;
@@ -127,7 +127,7 @@ fn broken(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     Ok(())
 }
 
-/// Our own modules: what is found, and how long it takes.
+/// Our own modules: findings and duration.
 fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     let ball = root().join("tests/models/ball.urdf").display().to_string();
     let deps = context.program.with_file_name("deps");
@@ -242,7 +242,7 @@ fn seeds(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     Ok(())
 }
 
-/// What the quick tests complain of in our soils with the numbers of every soil that can be used.
+/// Complaints of the quick tests about our soils with the parameters of every usable soil.
 fn soil_rows(context: &Context, soils: &[PathBuf], out: &mut Vec<Figure>) -> Outcome {
     let table = read_soil_table(&root().join("models/soils.csv"))?;
     let (mut alarms, mut count) = (0_u32, 0_u32);

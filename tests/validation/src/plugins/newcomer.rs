@@ -27,7 +27,7 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
             let place = folder.join(&name);
             let program = context.program.display().to_string();
             typed(&folder, &[&program, "new", kind, &name, "--lang", language])?;
-            // what there is to do in place of a build: see whether all names fit
+            // in place of a build: check that all names fit
             let check: &[&str] = &[&program, "check", "scenario.toml"];
             typed(&place, if build.is_empty() { check } else { build })?;
             typed(&place, &[&program, "run", "scenario.toml", "--quiet"])?;

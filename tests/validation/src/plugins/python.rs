@@ -40,14 +40,14 @@ class Faulty(tg.Subsystem):
             FAULT
 "#;
 
-/// Statements that fail, and what must be told of each.
+/// Statements that fail, and the expected message of each.
 const FAULTS: [(&str, &str); 3] = [
     ("1 / 0", "ZeroDivisionError"),
     ("os.kill(os.getpid(), 9)", "signal 9"),
     ("[0 for _ in iter(int, 1)]", "did not answer"),
 ];
 
-/// How many of three faults are told with name, function and time.
+/// How many of three faults are reported with name, function and time.
 pub fn faults(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     let mut told = 0;
     for (k, (statement, words)) in FAULTS.iter().enumerate() {

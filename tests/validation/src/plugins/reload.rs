@@ -63,7 +63,7 @@ fn made(context: &Context, language: Language) -> Outcome<PathBuf> {
     }
 }
 
-/// When the recording would hear of an exchange.
+/// The time at which a recording would get the event of an exchange.
 #[derive(Default)]
 struct Heard(Option<(Instant, String)>);
 

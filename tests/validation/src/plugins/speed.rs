@@ -126,7 +126,7 @@ impl Terrain for Level {
     }
 }
 
-/// What reading a variable through the table of functions costs more than through `dyn`.
+/// Extra cost of reading a variable through the table of functions instead of `dyn`.
 fn table(context: &Context, deps: &Path, out: &mut Vec<Figure>) -> Outcome {
     let services = HostServices { terrain: Some(Arc::new(Level)), ..HostServices::new(1, &context.scratch) };
     let made = |module: LoadedModule| -> Outcome<Instance> {

@@ -14,8 +14,8 @@ use terraglue_subsystem::Geometry;
 
 /// Length of the way, m.
 const WAY: f64 = 0.3;
-/// Part of a cell that a body goes in a step: what comes below it at once bears less, a hundredth here, a tenth in steps of a
-/// fifth of a cell.
+/// Part of a cell that a body goes in a step: soil that comes below it at once bears less, a hundredth here, a tenth in steps
+/// of a fifth of a cell.
 const STEP: f64 = 0.05;
 /// Way over which the load is laid on, m.
 const LAID_ON: f64 = 0.03;
@@ -100,13 +100,13 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// The grids on which a body is dragged. In the quick form all of them for the one whose force depends most on them: a sphere that digs
-/// itself in, since what carries shear bears less.
+/// itself in, since sheared soil bears less.
 fn spacings(context: &Context, soil: &SoilRow, body: &Dragged) -> &'static [f64] {
     let all = !context.quick || (soil.name != SOILS[0] && body.name == "sphere");
     if all { &[0.01, 0.005, 0.0025] } else { &[0.01] }
 }
 
-/// The force on both soils, grid by grid, and on the finest grid beside the one before.
+/// The force on both soils, grid by grid, and on the finest grid against the one before.
 fn by_grid(context: &Context, soil: &SoilRow) -> Vec<Figure> {
     let bodies = bodies();
     let mut cases = Vec::new();
@@ -172,7 +172,7 @@ fn by_direction(context: &Context, soil: &SoilRow) -> Vec<Figure> {
                     .filter(move |(c, _)| c.0.name == body.name && c.1 == module && is(c.3));
                 mine.map(|(_, f)| *f)
             };
-            // turned by 90° the lattice and the nodes are the same: what is left are units of height that do not divide
+            // turned by 90° the lattice and the nodes are the same: the rest are units of height that do not divide
             for (name, along, limit) in [("quarter_turns", true, 1.0), ("directions", false, 10.0)] {
                 let worst = larger(spread(of(along).map(|f| f[0])), spread(of(along).map(|f| f[1])));
                 let what = format!(

@@ -1,5 +1,5 @@
 //! A bench for one body of any shape on level soil: its horizontal motion and rotation are given, vertically it carries a load
-//! or moves as told. It keeps the balance of energies beside the soil's own ledger.
+//! or moves as prescribed. It keeps the balance of energies independently of the soil's own ledger.
 
 use super::fixture::Shown;
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
@@ -8,10 +8,10 @@ use terraglue_subsystem::{
     Geometry, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
 };
 
-/// Gap up to which ground below the body is looked at, m.
+/// Gap up to which ground below the body counts, m.
 const MARGIN: f64 = 5e-3;
 
-/// What happens vertically in a step.
+/// Vertical load or motion in a step.
 #[derive(Clone, Copy, Debug)]
 pub enum Vertical {
     /// The body carries this load, N.
@@ -20,7 +20,7 @@ pub enum Vertical {
     Up(f64),
 }
 
-/// A step: what the body's centre does.
+/// A step of the body's centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Move {
     /// Displacement in world x and y, m.

@@ -13,7 +13,7 @@ const STRATEGIES: [&str; 4] = ["cooperative", "cooperative-compliant", "iterativ
 const ROWS: [&str; 4] = ["lunar_nominal_Apollo", "LETE_sand", "snow_US_Harrison", "clayey_Thai38_K010"];
 const SPACINGS: [f64; 3] = [0.02, 0.01, 0.005];
 
-/// What the rig does.
+/// Motion of the rig.
 struct Way {
     name: &'static str,
     shape: &'static str,
@@ -83,7 +83,7 @@ impl EnergyCase {
 
     fn scenario(&self, h: f64) -> String {
         let Way { low, travel, turn, roll, .. } = WAYS[self.way];
-        // 64.7 N on a wheel, 20 N on a foot, what weak snow carries; fork, mount and foot weigh 9.81 N
+        // 64.7 N on a wheel, 20 N on a foot, the load that weak snow carries; fork, mount and foot weigh 9.81 N
         let load = match (WAYS[self.way].shape == WHEEL, self.row.starts_with("snow")) {
             (true, false) => 64.7,
             (true, true) => 20.0,
@@ -257,9 +257,9 @@ fn dragged(context: &Context) -> Outcome<Vec<Figure>> {
 
 /// How sinkage (m) and heat (J) of a dragged foot converge over steps that halve from 2 ms on.
 ///
-/// A sphere rides on the soil that it meets: its sinkage has an order, its heat is within what single nodes add as they come
-/// under it (4 % on a lattice of 10 mm, 1 % on 2.5 mm). A flat disc sinks until it is carried, whatever the step: its
-/// sinkage has converged, its heat has an order.
+/// A sphere rides on the soil that it meets: its sinkage has an order, its heat is within the contribution of single nodes
+/// as they come under it (4 % on a lattice of 10 mm, 1 % on 2.5 mm). A flat disc sinks until it is carried, whatever the
+/// step: its sinkage has converged, its heat has an order.
 fn convergence(name: &str, row: &str, sinkage: &[f64], heat: &[f64]) -> Vec<Figure> {
     let figure = |end: &str, value: f64, limit: Limit, what: &str| {
         let what = format!("{name} in {row}: {what} by cooperative in steps of 2 to 0.25 ms");

@@ -1,4 +1,4 @@
-//! Real plates: the laws fitted to the presses of two discs into Direct-90 sand, and what one box says of the other.
+//! Real plates: the laws fitted to presses of two discs into Direct-90 sand, and predictions of one box by the other.
 
 use crate::process::{Outcome, root};
 use crate::{Context, Figure, Limit};
@@ -37,8 +37,8 @@ pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// Fit to the discs of one diameter, error on the other ones. One size cannot tell cohesion from width, so the fit takes
-/// the pressure in proportion to the width: the size effect of the law itself is held against what was not seen.
+/// Fit to the discs of one diameter, error on the other ones. One size cannot separate cohesion and width, so the fit
+/// takes the pressure in proportion to the width: the size effect of the law itself is compared with the unseen discs.
 fn unseen_diameters(readings: &[Reading]) -> Outcome<Vec<Figure>> {
     let mut radii: Vec<f64> = readings.iter().map(|r| r.b).collect();
     radii.sort_by(f64::total_cmp);

@@ -7,7 +7,7 @@ use crate::process::{Outcome, run_scenario};
 use crate::{Context, Figure, Limit, columns};
 use terraglue_numerics::extremes::larger;
 
-/// Name, scenario, what is set beside the soil, duration (s) and the time until which its wheels stand, s. On the slope the
+/// Name, scenario, settings besides the soil, duration (s) and the time until which its wheels stand, s. On the slope the
 /// rover rolls back before it is driven: its drives hold no angle.
 type DrivenRover = (&'static str, &'static str, &'static [&'static str], &'static str, f64);
 const RUNS: [DrivenRover; 3] = [
@@ -38,7 +38,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What the steps of a run show, counted by wheel.
+/// Counts over the steps of a run, by wheel.
 #[derive(Default)]
 struct Steps {
     steps: usize,

@@ -29,7 +29,7 @@ struct Wheel {
     radius: f64,
 }
 
-/// What a driven wheel does.
+/// Figures of a driven wheel.
 #[derive(Clone, Copy)]
 struct Driven {
     /// Depth of its lowest point, mm.

@@ -1,4 +1,4 @@
-//! Area `soil`: what both soils promise, part by part.
+//! Area `soil`: the promises of both soils, part by part.
 
 mod automaton;
 mod drags;

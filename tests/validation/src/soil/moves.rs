@@ -1,5 +1,5 @@
-//! What a soil owes to any body that presses, drags, twists, rolls and yaws: the same answer on every grid and on both soils,
-//! the balance of energies, and the force that resistive force theory gives a sphere.
+//! Requirements on a soil under any body that presses, drags, twists, rolls and yaws: the same answer on every grid and on
+//! both soils, the balance of energies, and the force that resistive force theory gives a sphere.
 
 use super::MODULES;
 use super::drive::{Balance, Drive, Move, Vertical, on_rim};
@@ -40,7 +40,7 @@ fn shapes() -> [(&'static str, Geometry, [f64; 4], f64); 4] {
     ]
 }
 
-/// Sinkage of a shape under its load, laid on in steps, and volumes of what was displaced and compacted, m³.
+/// Sinkage of a shape under its load, laid on in steps, and displaced and compacted volumes, m³.
 fn pressed(make: Maker, config: &str, shape: usize, spacing: f64) -> f64 {
     let (_, geometry, lies, load) = shapes()[shape].clone();
     let soil = make(config, (0.6 / spacing) as u32 + 1, spacing);
@@ -192,7 +192,7 @@ fn ruts(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What a foot does in the balances, by step.
+/// Motion of a foot in the balances, by step.
 type Script = (&'static str, fn(u32) -> Move);
 
 const fn still(ahead: f64, load: f64, turn: [f64; 3]) -> Move {
@@ -231,7 +231,7 @@ fn laid(k: u32, load: f64) -> f64 {
 
 const BALANCED: [&str; 4] = ["lunar_nominal", "LETE_sand", "snow_US_Harrison", "clayey_Thai38"];
 
-/// Script, soil, module, shape and spacing of a run whose balance is looked at.
+/// Script, soil, module, shape and spacing of a run whose balance is checked.
 type BalancedCase = (usize, &'static str, Maker, usize, f64);
 
 /// Error of the balance of energies of such a run over the path of the work, and the largest fall of its heat in a step, J.

@@ -2,15 +2,15 @@
 
 use std::fmt::Write;
 
-/// A panel of a picture: origin in the picture, its size, and what lies at its corners.
+/// A panel of a picture: origin in the picture, its size, and the coordinates at its corners.
 pub struct Panel {
     /// Upper left corner in the picture.
     pub at: [f64; 2],
     /// Width and height in the picture.
     pub size: [f64; 2],
-    /// What lies in the lower left corner.
+    /// Coordinates of the lower left corner.
     pub low: [f64; 2],
-    /// What lies in the upper right corner.
+    /// Coordinates of the upper right corner.
     pub high: [f64; 2],
 }
 

@@ -66,7 +66,7 @@ fn points(file: &str, columns: [Option<&str>; 6]) -> Outcome<Vec<Point>> {
     Ok(all)
 }
 
-/// What the plates alone say, as a module's parameters.
+/// Parameters of a module, from the plates alone.
 fn config() -> Outcome<String> {
     let tests = read_plates(&root().join(PLATES), FROM).map_err(|e| e.to_string())?;
     let fit = fit_law("bearing", &tests, SAND).map_err(|e| e.to_string())?;

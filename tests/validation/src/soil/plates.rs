@@ -28,7 +28,7 @@ fn shapes() -> [(&'static str, Geometry, f64, f64); 6] {
         )
     };
     let rectangle = |name, a: f64, b: f64| {
-        // the disc of equal area, or that which bears what an endless strip as broad does (Terzaghi 1943)
+        // the disc of equal area, or that which bears as much as an endless strip as broad (Terzaghi 1943)
         let size = (a * b / std::f64::consts::PI).sqrt().min(5.0 / 6.0 * a.min(b));
         (name, Geometry::Box { half_extents: [0.5 * a, 0.5 * b, 0.1] }, size, a * b)
     };

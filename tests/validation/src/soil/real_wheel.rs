@@ -13,7 +13,7 @@ use terraglue_numerics::extremes::largest;
 const RADIUS: f64 = 0.058;
 const WIDTH: f64 = 0.05;
 const FILE: &str = "tests/reference/terramechanics/cmu_smooth_beta0_mean.csv";
-/// What is known of the sand of the plates (`CMU_Direct90_s0`), and its numbers, where the search begins.
+/// Known properties of the sand of the plates (`CMU_Direct90_s0`), and the parameters with which the search begins.
 const SAND: Known =
     Known { c_pa: Some(1000.0), phi_rad: Some(0.506145483078), shear_m: None, density: Some(1330.0) };
 const START: WheelStart = WheelStart { n: 1.46, k_phi: 8e6 };

@@ -69,7 +69,7 @@ impl RigCase {
         Rim { unloading: STIFF, ..wheel }.under(LOAD, self.slip)
     }
 
-    /// Errors of sinkage (%), of drawbar pull and of the load (% of the load), and of the slip that the soil tells.
+    /// Errors of sinkage (%), of drawbar pull and of the load (% of the load), and of the slip that the soil reports.
     fn errors(&self, context: &Context) -> Outcome<[f64; 4]> {
         let (found, expected) = (self.driven(context)?, self.expected());
         let of = |name: &str| found.get(name).copied().unwrap_or(f64::NAN);

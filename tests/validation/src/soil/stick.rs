@@ -25,7 +25,7 @@ fn slope(x: f64, _: f64) -> f64 {
     -x * SLOPE_DEG.to_radians().tan()
 }
 
-/// What is seen of a held disc.
+/// Figures of a held disc.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     /// Path after the first two seconds, m.

@@ -40,7 +40,7 @@ impl BorrowMut<dyn Subsystem> for Open {
     }
 }
 
-/// What lies below the wheel: places ahead of and beside the axle (m), pressure and shear stress that drives (Pa).
+/// Nodes below the wheel: places ahead of and beside the axle (m), pressure and driving shear stress (Pa).
 struct Contact {
     nodes: Vec<([f64; 2], [f64; 2])>,
     sinkage: f64,

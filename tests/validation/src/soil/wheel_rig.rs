@@ -9,7 +9,7 @@ use terraglue_subsystem::{
 
 /// Way of the rim per step, m.
 const STRIDE: f64 = 5e-4;
-/// Gap up to which ground below the rim is looked at, m.
+/// Gap up to which ground below the rim counts, m.
 const MARGIN: f64 = 5e-3;
 
 /// The bench.
@@ -25,7 +25,7 @@ pub struct Bench<S = Box<dyn Subsystem>> {
     nodes: Vec<Node>,
 }
 
-/// What the bench shows, means over a way.
+/// Readings of the bench, means over a way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Depth of the lowest point below the undisturbed level, m.
@@ -60,7 +60,7 @@ impl<S: BorrowMut<dyn Subsystem>> Bench<S> {
         Reading { sinkage: sum.sinkage / count, pull: sum.pull / count, torque: sum.torque / count }
     }
 
-    /// One step: the axle goes by `ahead`, the rim turns by `rim` (m); the wheel sinks as its load wants.
+    /// One step: the axle goes by `ahead`, the rim turns by `rim` (m); the wheel sinks under its load.
     fn step(&mut self, ahead: f64, rim: f64) -> Reading {
         let port = self.port();
         let (ports, nodes) = ([port], std::mem::take(&mut self.nodes));

@@ -72,12 +72,12 @@ const SLIPS: [f64; 7] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8];
 
 /// All figures.
 ///
-/// The integral knows no material that moves: what it is held against is soil that becomes denser where it is pressed, and
-/// walls of ruts that stand. What heaps and slides do to it on the automaton is told beside.
+/// The integral knows no material that moves: it is compared with soil that becomes denser where it is pressed, and walls
+/// of ruts that stand. The effect of heaps and slides on the automaton is reported separately.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = Vec::new();
     let depth = "the integral of the stresses with a0 = a1 = 0 and elastic exit";
-    // what becomes denser in place is pressed by the same code in both soils
+    // soil that becomes denser in place is pressed by the same code in both soils
     let [(name, make), _] = MODULES;
     all.extend(errors(&format!("{name}.wheel.integral"), depth, &cases(context, make, [0.0; 2], true)?));
     let of = "the integral with a0 = 0.4, a1 = 0.15 (wongreece_wheel.csv)";

@@ -1,4 +1,4 @@
-//! Figures of sweeps: that the table does not depend on who runs the cases and what was killed between, and what ten thousand cases cost.
+//! Figures of sweeps: that the table does not depend on who runs the cases and what was killed, and the cost of ten thousand cases.
 
 use crate::process::{Outcome, command, must, root, write};
 use crate::{Context, Figure, Limit, Part};
@@ -61,7 +61,7 @@ fn table(context: &Context) -> Outcome<Vec<Figure>> {
     ])
 }
 
-/// What ten thousand cases cost to list and to collect.
+/// Cost of listing and collecting ten thousand cases.
 fn many(context: &Context) -> Outcome<Vec<Figure>> {
     if !context.timing {
         return Ok(["list_s", "collect_s"]

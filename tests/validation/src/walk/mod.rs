@@ -1,5 +1,5 @@
-//! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it; and what its gait
-//! does to the feet.
+//! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it; and the motion of
+//! the feet under its gait.
 
 mod picture;
 mod prints;
@@ -82,7 +82,7 @@ fn prints(combinations: &[(&str, &str)], summaries: &[Value]) -> Vec<Figure> {
     SOILS.map(figure).into()
 }
 
-/// The walk on every row of the table that has all numbers; quickly on two. A soil that buries the robot has to say so.
+/// The walk on every row of the table that has all numbers; quickly on two. Burying the robot has to be reported.
 fn rows(context: &Context) -> Outcome<Vec<Figure>> {
     let table = SoilTable::parse(&read(&root().join("models/soils.csv"))?).map_err(|e| e.to_string())?;
     let usable = table.rows.iter().filter(|row| row.offered(&[]).is_ok()).map(|row| row.name.clone());

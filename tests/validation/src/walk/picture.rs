@@ -1,5 +1,5 @@
-//! `cargo xtask pictures`: the picture of the README, `scenarios/moon_walk.toml` from above, as an SVG file. What it shows is the map of
-//! the run's report: ground, footprints and path.
+//! `cargo xtask pictures`: the picture of the README, `scenarios/moon_walk.toml` from above, as an SVG file. It shows the map of the
+//! run's report: ground, footprints and path.
 
 use super::SCENARIO;
 use crate::columns;
@@ -13,7 +13,7 @@ use std::path::Path;
 const FILE: &str = "docs/images/moon_walk.svg";
 /// Colours of the legs, as many as a hexapod has.
 const COLOURS: [&str; 6] = ["#06c", "#c60", "#084", "#b22", "#74b", "#088"];
-/// What is shown beyond prints and path, m.
+/// Margin beyond prints and path, m.
 const AIR: f64 = 0.15;
 
 /// Walks and draws.
@@ -97,7 +97,7 @@ fn ground(out: &mut String, map: &Value, panel: &Panel) -> Option<()> {
     Some(())
 }
 
-/// What the colours mean.
+/// The scale of colours.
 fn scale(out: &mut String, scale: &Value, y: f64) -> Option<()> {
     let stops = scale["stops"].as_array()?;
     let width = 240.0 / stops.len() as f64;

@@ -28,7 +28,7 @@ pub fn figures(context: &Context, usual: &Value) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What a foot bears on the soil with.
+/// Load of a foot on the soil.
 #[derive(Clone, Copy, PartialEq)]
 enum Load {
     /// As the scenario has it: a foot that carries shear, too, sinks deeper.
@@ -38,7 +38,7 @@ enum Load {
 }
 
 impl Load {
-    /// End of the figure's id, and what the figure is about.
+    /// End of the figure's id, and the end of its meaning.
     fn names(self) -> [&'static str; 2] {
         match self {
             Self::Whole => ["slow", ""],

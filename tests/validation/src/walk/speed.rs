@@ -1,5 +1,5 @@
-//! What a step of the shipped scenarios costs as a whole, recording included, and against MuJoCo's step of the same robot on
-//! rigid ground in the same run. Told always where clocks may be read, judged under `--timing` only.
+//! Cost of a step of the shipped scenarios as a whole, recording included, and against MuJoCo's step of the same robot on
+//! rigid ground in the same run. Reported wherever clocks may be read, judged under `--timing` only.
 
 use crate::process::Outcome;
 use crate::rigid_body::mujoco_gait;

@@ -1,4 +1,4 @@
-"""Measures what the page of a run promises: `measure.py PART FOLDER`. Prints `name<TAB>value<TAB>what` for each figure; `skip` in place of
+"""Measures the promises of the page of a run: `measure.py PART FOLDER`. Prints `name<TAB>value<TAB>what` for each figure; `skip` in place of
 the value where a program or a package is missing."""
 
 import json

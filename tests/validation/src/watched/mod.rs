@@ -1,5 +1,5 @@
-//! Figures of the page of a run: that watching changes nothing and holds nobody up, how fast the past is, what the ground costs, and how
-//! the page draws in a real browser. Without a browser or the Python packages of the tests their lines say `skip`.
+//! Figures of the page of a run: that watching changes nothing and delays no run, the speed of the past, the cost of the ground, and
+//! how the page draws in a real browser. Without a browser or the Python packages of the tests their lines have `skip`.
 
 use crate::process::{Outcome, command, root, target};
 use crate::{Context, Figure, Limit, Part};
@@ -28,7 +28,7 @@ fn untouched(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(measure("untouched", context, &bars))
 }
 
-/// Memory while the run goes as fast as it can; flat within what allocators keep.
+/// Memory while the run goes as fast as it can; flat within the reserves of allocators.
 fn free(context: &Context) -> Outcome<Vec<Figure>> {
     long(context, "free", &[("memory_mb", AtMost(32.0), Figure::noisy)])
 }
@@ -50,7 +50,7 @@ fn past(context: &Context) -> Outcome<Vec<Figure>> {
     long(context, "past", &bars)
 }
 
-/// What the page draws without a graphics card at 1400 × 900.
+/// Drawing of the page without a graphics card at 1400 × 900.
 fn browser(context: &Context) -> Outcome<Vec<Figure>> {
     let bars: [Bar; 5] = [
         ("frames_per_s", AtLeast(8.0), Figure::timed),
@@ -70,7 +70,7 @@ fn long(context: &Context, part: &str, bars: &[Bar]) -> Outcome<Vec<Figure>> {
     Ok(measure(part, context, bars))
 }
 
-/// What the script prints: `name<TAB>value<TAB>what`; a figure that it does not print is skipped with its last words.
+/// Figures printed by the script: `name<TAB>value<TAB>what`; one that it does not print is skipped with its last words.
 fn measure(part: &str, context: &Context, bars: &[Bar]) -> Vec<Figure> {
     let id = |name: &str| format!("page.{part}.{name}");
     let printed = match printed(part, context) {

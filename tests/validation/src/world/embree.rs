@@ -1,6 +1,6 @@
 //! The same triangles in Embree, installed by name: where rays meet them, and how many it casts in a second.
 //!
-//! Only in the long run. Embree computes in single precision, so a ray at an edge may meet what it misses here.
+//! Only in the long run. Embree computes in single precision, so a ray at an edge may meet a shape that it misses here.
 
 use super::scenes::{cast, stand, told};
 use super::{Context, Figure, Limit};
@@ -253,7 +253,7 @@ impl Drop for Embree {
     }
 }
 
-/// What stands behind `RESULT`.
+/// The text after `RESULT`.
 fn result(text: &str) -> &str {
     text.lines().find_map(|line| line.strip_prefix("RESULT ")).unwrap_or_default().trim()
 }

@@ -1,4 +1,4 @@
-//! Figures of what can be seen: rays against a loop over all shapes and against Embree, and what they cost.
+//! Figures of the world: rays against a loop over all shapes and against Embree, and their cost.
 
 mod embree;
 mod rays;

@@ -11,14 +11,14 @@ use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::RayHit;
 use terraglue_world::Parallel;
 
-/// What came of the rays through some worlds.
+/// Counts over the rays through some worlds.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     rays: usize,
     hits: usize,
     wrong: usize,
     grazing: usize,
-    /// Largest error of a distance, of what is allowed.
+    /// Largest error of a distance over the allowed one.
     error: f64,
 }
 

@@ -5,7 +5,7 @@ use random_scenes::{Stand, lend};
 use terraglue_subsystem::{Ray, RayHit, RayMask, Scene, World};
 use terraglue_world::{Parallel, WorldBuilder, WorldModel};
 
-/// What is wrong with a world, as text.
+/// The error of a world as text.
 pub fn told<T>(result: terraglue_world::Result<T>) -> Outcome<T> {
     result.map_err(|e| e.to_string())
 }
@@ -24,7 +24,7 @@ pub fn stand(stand: &Stand, scene: &Scene, parallel: Option<Parallel>) -> Outcom
     Ok(world)
 }
 
-/// What all rays meet.
+/// The first hits of all rays.
 pub fn cast(world: &WorldModel, rays: &[Ray]) -> Vec<RayHit> {
     let mut hits = vec![RayHit::MISS; rays.len()];
     world.cast_rays(rays, &RayMask::ALL, &mut hits);

@@ -1,4 +1,4 @@
-//! What rays cost: in a second, beside Embree, on two threads; and what a step costs, with bodies that move and many that do not.
+//! Cost of rays: in a second, against Embree, on two threads; and of a step with bodies that move and many that do not.
 
 use super::embree::{Embree, above, os1_64, python, triangles_of, vlp16};
 use super::scenes::{stand, told};
@@ -77,7 +77,7 @@ fn rates(
     Ok(out)
 }
 
-/// What a step costs in which a hundred bodies move, without and with ten thousand that do not.
+/// Cost of a step in which a hundred bodies move, without and with ten thousand that do not.
 fn steps() -> Outcome<Vec<Figure>> {
     let (moving, _) = scenes(3, 300);
     let (fixed, _) = scenes(4, 10_300);

@@ -14,7 +14,7 @@ pub(crate) struct Folders {
 }
 
 impl Folders {
-    /// The file; else what was tried and a way out.
+    /// The file; else the places that were tried and a way out.
     pub fn find(&self, name: &str) -> Result<PathBuf, String> {
         let (tried, way_out) = match name.split_once("://") {
             None => (vec![self.beside.join(name)], "paths are relative to the robot file".to_owned()),
@@ -34,7 +34,7 @@ impl Folders {
         if let Some(found) = tried.iter().find(|p| p.is_file()) {
             return Ok(found.clone());
         }
-        // There, and yet no file that can be read whole: opening it says why.
+        // There, and yet no file that can be read whole: opening it gives the reason.
         if let Some(other) = tried.iter().find(|p| p.exists())
             && let Err(why) = terraglue_subsystem::files::open(other)
         {

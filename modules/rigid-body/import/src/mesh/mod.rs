@@ -1,4 +1,4 @@
-//! Triangles from a file or from the text: what they enclose, and their convex hull.
+//! Triangles from a file or from the text: the solid that they enclose, and their convex hull.
 
 mod collada;
 mod find;
@@ -16,8 +16,8 @@ use std::f64::consts::PI;
 /// A hull with more corners than this is replaced by that of its farthest corners along as many directions.
 const MOST_CORNERS: usize = 200;
 
-/// A closed mesh is convex where its hull's volume differs from its own by no more than this part: what single precision
-/// makes of the corners of a convex one.
+/// A closed mesh is convex where its hull's volume differs from its own by no more than this part: the effect of single
+/// precision on the corners of a convex one.
 const SAME_VOLUME: f64 = 1e-5;
 
 /// An open mesh is convex where its triangles lie on its hull, to this part of its size.
@@ -97,8 +97,8 @@ impl Mesh {
         self.triangles.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Volume, centre and inertia of what the triangles enclose: the sum over the tetrahedra between them and the
-    /// origin (Tonon, J. Math. Stat. 1, 2005).
+    /// Volume, centre and inertia of the solid that the triangles enclose: the sum over the tetrahedra between them and
+    /// the origin (Tonon, J. Math. Stat. 1, 2005).
     pub(crate) fn solid(&self) -> Solid {
         let (mut volume, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
         for t in &self.triangles {

@@ -40,7 +40,7 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, String> {
 /// Bytes of a binary STL file before its triangles, and of each triangle.
 const STL: (usize, usize) = (84, 50);
 
-/// Hides the header of a binary STL file that begins with the word of ascii ones: its length tells them apart.
+/// Hides the header of a binary STL file that begins with the word of ascii ones: its length distinguishes them.
 fn without_false_start(bytes: &mut [u8]) {
     let Some(count) = bytes.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes) else {
         return;
@@ -83,7 +83,7 @@ fn by_loader(path: &Path, ending: &str, bytes: &mut [u8]) -> Result<Mesh, String
     mesh.finish()
 }
 
-/// Corners as they stand in a text, without triangles.
+/// Corners as listed in a text, without triangles.
 pub(crate) fn corners_of(numbers: &[f64]) -> Mesh {
     let points = numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     Mesh { points, triangles: Vec::new() }

@@ -17,7 +17,7 @@ const MOST_NODES: u32 = 1 << 14;
 /// An asset, or why there is none: that matters only where a shape needs it.
 pub(super) type Asset<T> = Result<T, String>;
 
-/// A mesh and what stands for it where it moves.
+/// A mesh and its replacement on bodies that move.
 pub(super) struct MeshAsset {
     pub triangles: Arc<Mesh>,
     pub hull: Arc<Mesh>,

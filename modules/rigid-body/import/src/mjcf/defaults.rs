@@ -54,7 +54,7 @@ impl<'a> Defaults<'a> {
         let mut me = Self { whole, classes: BTreeMap::new(), angle, eulerseq, autolimits, weigh_geoms };
         compilers().try_for_each(|c| me.check_compiler(c))?;
         for node in root.children().filter(|n| n.has_tag_name("default")) {
-            // a further section goes on with what was said before
+            // a further section extends the earlier ones
             let before = me.classes.get("main").cloned().unwrap_or_default();
             let name = node.attribute("class").unwrap_or("main");
             me.read(node, &before, name)?;
@@ -168,7 +168,7 @@ impl<'a> Defaults<'a> {
         }
     }
 
-    /// A number that is not negative; `why` says what else it would do.
+    /// A number that is not negative; `why` is the effect of a negative one.
     pub fn not_negative(&self, e: &Element, name: &str, why: &str) -> Result<Option<f64>, Error> {
         match self.number(e, name)? {
             Some(x) if x < 0.0 => Err(self.wrong(e, format!("{name} = {x} is negative: {why}"))),
@@ -185,7 +185,7 @@ impl<'a> Defaults<'a> {
         }
     }
 
-    /// The first of several numbers, where the others say nothing here.
+    /// The first of several numbers, where the others have no effect here.
     pub fn first(&self, e: &Element, name: &str) -> Result<Option<f64>, Error> {
         Ok(self.numbers(e, name)?.map(|n| n[0]))
     }
@@ -275,7 +275,7 @@ impl<'a> Defaults<'a> {
     }
 }
 
-/// The names under which a default class speaks of an element: all actuators are also `<general>`.
+/// The names of an element in a default class: all actuators are also `<general>`.
 fn tags<'n>(e: &Element<'n, '_>) -> impl Iterator<Item = &'n str> + use<'n> {
     let tag = e.node.tag_name().name();
     let general = ["position", "velocity", "motor"].contains(&tag).then_some("general");

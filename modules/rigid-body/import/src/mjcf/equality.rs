@@ -1,4 +1,4 @@
-//! Equality: what is held together beyond the tree.
+//! Equality: constraints beyond the tree.
 
 use super::MjcfReader;
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! Geoms: shapes, what they weigh, planes.
+//! Geoms: shapes, their masses, planes.
 
 use super::assets::Assets;
 use super::defaults::{Defaults, Element, from_z};
@@ -113,7 +113,7 @@ fn between(d: &Defaults, e: &Element, ends: &[f64]) -> Result<(Isometry3<f64>, f
     Ok((pose, (to - from).norm() / 2.0))
 }
 
-/// Sliding friction; none where nothing is said.
+/// Sliding friction; none where it is not given.
 fn friction(d: &Defaults, e: &Element) -> Result<Option<f64>, Error> {
     let friction = match d.text(e, "condim") {
         Some("1") => Some(0.0),
@@ -148,7 +148,7 @@ fn unsupported(d: &Defaults, e: &Element, kind: &str) -> Result<Geom, Error> {
     }
 }
 
-/// A mesh by its name: triangles where it stands still, else its hull, beside its own form where it is not convex.
+/// A mesh by its name: triangles where it stands still, else its hull, with its own form too where it is not convex.
 fn mesh(
     d: &Defaults,
     e: &Element,

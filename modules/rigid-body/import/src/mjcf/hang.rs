@@ -107,7 +107,7 @@ impl MjcfReader<'_, '_> {
         of_body.filter(|n| n.has_tag_name("joint") || n.has_tag_name("freejoint")).count() > 1
     }
 
-    /// A ball turns freely: what else it says is named.
+    /// A ball joint turns freely: its other attributes are reported.
     fn ball(&mut self, e: &Element) -> Result<(), Error> {
         for name in ["range", "damping", "frictionloss", "armature", "stiffness"] {
             if self.d.numbers(e, name)?.is_some_and(|n| n.iter().any(|x| *x != 0.0)) {

@@ -9,7 +9,7 @@ const TURNED: &[&str] = &["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"
 /// Attributes without effect on the mechanics, or that only tune MuJoCo's solver and its soft limits.
 const HARMLESS: &[&str] = &["name", "class", "group", "user", "rgba", "material"];
 
-/// Per element what is read, and what is without effect besides [`HARMLESS`].
+/// Per element the attributes that are read, and those without effect besides [`HARMLESS`].
 const KNOWN: [(&str, &[&str]); 17] = [
     (
         "joint",
@@ -178,7 +178,7 @@ impl Ignored {
 }
 
 impl MjcfReader<'_, '_> {
-    /// Notes what an element says in vain, itself or by its default class.
+    /// Notes the attributes of an element, its own or those of its default class, that have no effect.
     pub(super) fn warn_ignored(&mut self, node: Node, class: Option<&str>) {
         let tag = node.tag_name().name();
         let Some((_, known)) = KNOWN.iter().find(|(element, _)| *element == tag) else { return };
@@ -186,7 +186,7 @@ impl MjcfReader<'_, '_> {
         let e = if node.attribute("class").is_some() { e } else { e.inheriting(class) };
         let read = |name: &str| known.contains(&name) || HARMLESS.contains(&name) || TURNED.contains(&name);
         for (name, value) in self.d.attributes(&e) {
-            // A switch says something by being off, anything else by not being 0.
+            // A switch matters when it is off, anything else when it is not 0.
             let off: &[&str] = if tag == "flag" { &["enable"] } else { &["0", "0.0", "false"] };
             if read(&name) || value.split_whitespace().all(|v| off.contains(&v)) {
                 continue;
@@ -195,7 +195,7 @@ impl MjcfReader<'_, '_> {
         }
     }
 
-    /// Notes that what an attribute says does nothing.
+    /// Notes that an attribute has no effect.
     pub(super) fn ignore(&mut self, node: Node, name: &str, value: &str) {
         let text = format!("has `{name}` = \"{value}\", which is not supported and does nothing");
         let text = self.place(node, &text);

@@ -1,9 +1,9 @@
 //! From the text of an MJCF file to the checked robot.
 //!
 //! Bodies, free, hinge, slide and ball joints, geoms, planes, position, velocity and torque motors, armature, damping,
-//! friction, springs, limits, default classes, excluded pairs, included files. What acts on the mechanics and is not known here is
-//! named in a warning with its line; what would make another mechanism of it is refused. Step, gravity and solver are
-//! the scenario's.
+//! friction, springs, limits, default classes, excluded pairs, included files. Unknown elements that act on the mechanics are
+//! named in a warning with their line; those that would change the mechanism are refused. Step, gravity and solver are the
+//! scenario's.
 
 mod actuators;
 mod assets;
@@ -32,14 +32,14 @@ use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use survey::survey;
 
-/// Elements that say nothing about the mechanics.
+/// Elements without effect on the mechanics.
 const SEEN_ONLY: [&str; 9] =
     ["site", "camera", "light", "visual", "statistic", "asset", "size", "compiler", "default"];
 
-/// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
+/// Reads the text of a file; `file` appears in messages and gives the folder of meshes.
 ///
 /// # Errors
-/// [`Error`] with line and element: what cannot be read or simulated.
+/// [`Error`] with line and element: a part that cannot be read or simulated.
 pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
     let whole = MergedFile::read(file, text)?;
     let source = Source { file, text: &whole.text };
@@ -64,7 +64,7 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     if robot.bodies.is_empty() {
         return Err(source.tree("there is no body that moves; a robot needs at least one"));
     }
-    // The first body that moves freely is the robot's; others start where the file says.
+    // The first body that moves freely is the robot's; others start where the file places them.
     robot.base = match robot.others.first() {
         Some((0, pose)) => Base::Free(*pose),
         _ => Base::World,
@@ -76,7 +76,7 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     Ok(robot)
 }
 
-/// Scales masses and inertias to what `<compiler settotalmass>` says, where that is above 0.
+/// Scales masses and inertias to the total of `<compiler settotalmass>`, where that is above 0.
 fn set_total_mass(d: &Defaults, root: Node, robot: &mut Robot) -> Result<(), Error> {
     let compilers = root.children().filter(|n| n.has_tag_name("compiler"));
     for e in compilers.map(|n| d.element(n, None)) {
@@ -252,7 +252,7 @@ impl<'d, 's> MjcfReader<'d, 's> {
             node.children().filter(|n| n.has_tag_name("joint") || n.has_tag_name("freejoint")).collect();
         let inertial = self.inertial(node, class, &name)?;
         let place = match (joints.first(), inertial) {
-            // It moves with what is above it and weighs nothing.
+            // It moves with its parent and weighs nothing.
             (None, None) => ElementPlace { frame, class, ..above },
             // Of the world.
             (None, Some(_)) if above.body.is_none() => ElementPlace { frame, class, ..above },
@@ -277,7 +277,7 @@ impl<'d, 's> MjcfReader<'d, 's> {
         self.contents(node, place, &name)
     }
 
-    /// `<inertial>`, or what the geoms weigh.
+    /// `<inertial>`, or the inertial of the geoms.
     fn inertial(&self, node: Node, class: Option<&str>, name: &str) -> Result<Option<Inertial>, Error> {
         let d = self.d;
         let inertial = node.children().find(|n| n.has_tag_name("inertial"));

@@ -15,7 +15,7 @@ use roxmltree::Node;
 const SHARE: f64 = 1e-6;
 
 impl MjcfReader<'_, '_> {
-    /// Hangs `name` below `above` by its joints, none or more, and says which body it is.
+    /// Hangs `name` below `above` by its joints, none or more, and returns its body.
     pub(super) fn hang_by<'a>(
         &mut self,
         joints: &[Node<'a, '_>],

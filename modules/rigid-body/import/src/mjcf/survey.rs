@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// Sections whose elements share their names, whatever their tags.
 const SHARED: [&str; 4] = ["actuator", "equality", "sensor", "tendon"];
 
-/// Refuses what no reader of single elements sees.
+/// Refuses faults that no reader of single elements sees.
 pub(super) fn survey(d: &Defaults, root: Node) -> Result<(), Error> {
     let mut names: BTreeMap<(&str, &str), Node> = BTreeMap::new();
     for node in root.descendants().filter(Node::is_element) {

@@ -1,6 +1,6 @@
-//! xacro by the Python package that is it: a process with bounds of its own, without a shell.
+//! xacro by its Python package: a process with bounds of its own, without a shell.
 //!
-//! xacro is Python inside XML, so what evaluates it is Python (docs/decisions/0018-xacro-runs-in-python-meshes-are-hulls.md).
+//! xacro is Python inside XML, so Python evaluates it (docs/decisions/0018-xacro-runs-in-python-meshes-are-hulls.md).
 
 use crate::Options;
 use crate::error::Error;
@@ -72,7 +72,7 @@ fn failure(path: &Path, done: &Output) -> String {
     }
     let said = String::from_utf8_lossy(&done.stderr);
     let said: Vec<&str> = said.lines().map(str::trim).filter(|l| !l.is_empty()).collect();
-    // The last lines say what happened; those before are of no use to who wrote the file.
+    // The last lines give the reason; those before are of no use to the author of the file.
     format!("xacro says: {}", said[said.len().saturating_sub(4)..].join("; "))
 }
 

@@ -1,4 +1,4 @@
-//! Walls that stand by cohesion in a window: the beds below what lies loose, and which of its slopes stand.
+//! Walls that stand by cohesion in a window: the beds below loose soil, and which of its slopes stand.
 
 use super::{LEFT, Limits, Window};
 use crate::active::Marks;
@@ -29,8 +29,8 @@ impl Window {
         }
     }
 
-    /// The levels of the beds and of what is at rest; where the lattice ends nothing lies loose. Returns whether anything lies
-    /// loose, and whether anything of it moves.
+    /// The levels of the beds and of the soil at rest; where the lattice ends nothing lies loose. Returns whether anything
+    /// lies loose, and whether anything of it moves.
     fn copy_beds(&mut self, ground: &Ground, moving: &Marks) -> [bool; 2] {
         let Self { beds, resting, levels, .. } = self;
         for copy in [beds, resting] {

@@ -1,4 +1,4 @@
-//! The module soil-cellular-automaton as a dynamic library, and what its section says of it.
+//! The module soil-cellular-automaton as a dynamic library, with the description in its section.
 terraglue_plugin::export_subsystem! {
     terraglue_soil_cellular_automaton::SoilCellularAutomaton,
     kind: "soil",

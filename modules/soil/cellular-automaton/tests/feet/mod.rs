@@ -71,7 +71,7 @@ impl Feet {
         }
     }
 
-    /// Copies what the bodies know.
+    /// Copies the state of the bodies.
     pub fn moment(&self) -> Moment {
         let Self { bodies, index, ports, owners, t, .. } = self;
         Moment {
@@ -83,7 +83,7 @@ impl Feet {
         }
     }
 
-    /// Back to a moment; the soil's state is restored beside.
+    /// Back to a moment; the soil's state is restored separately.
     pub fn return_to(&mut self, moment: &Moment) {
         let Moment { bodies, index, ports, owners, t } = moment.clone();
         (self.bodies, self.index, self.ports, self.owners, self.t) = (bodies, index, ports, owners, t);

@@ -94,7 +94,7 @@ impl Plain {
         rule(self, &mut change);
         for k in 0..change.len() {
             self.heights[k] += change[k];
-            // what comes below a foot takes its room; a foot that stands keeps none
+            // material that comes below a foot takes its room; a foot that stands keeps none
             if let Some(room) = self.room[k].filter(|room| *room != 0 && change[k] != 0) {
                 self.room[k] = Some(room.saturating_sub(change[k]).max(1));
             }

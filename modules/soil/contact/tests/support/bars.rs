@@ -255,7 +255,7 @@ pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], 
         let less = fixture.prescribed_step(&[back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
         assert!((less - (top - 4e8 * area * back)).abs() < 1e-6 * top, "{top} {less}");
         assert_eq!(fixture.prescribed_step(&[0.002, 0.0, 0.0, 0.0, 0.0, 0.0])[0], 0.0);
-        // reloading comes back to the same force at the same depth, to what a node remembers without a foot
+        // reloading comes back to the same force at the same depth, up to the memory of a node without a foot
         let again = fixture.prescribed_step(&[-0.002 - back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
         assert!(!stays || (again / top - 1.0).abs() < 1e-6, "{again} {top}");
     }

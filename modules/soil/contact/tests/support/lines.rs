@@ -60,7 +60,7 @@ pub fn forces<M: Module>(body: &Body, spacing: f64, depth: f64, at: [f64; 2]) ->
     [t[0], t[1]]
 }
 
-/// The depth that the soil tells of a body that was pressed to `depth` (m) at a `place`.
+/// The depth that the soil reports of a body that was pressed to `depth` (m) at a `place`.
 pub fn told<M: Module>(body: &Body, spacing: f64, depth: f64, place: (f64, [f64; 2])) -> f64 {
     let mut fixture = placed::<M>(body, spacing, place);
     let n = fixture.components();

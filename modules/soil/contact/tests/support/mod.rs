@@ -58,7 +58,7 @@ pub fn soil<M: Module>(
     hosted::<M>(config, Shaped { size: [size; 2], spacing, height }, None).0
 }
 
-/// An instance with a law of its own, and what it has logged so far.
+/// An instance with a law of its own, and its log so far.
 pub fn hosted<M: Module>(
     config: &str,
     terrain: Shaped,
@@ -71,7 +71,7 @@ pub fn hosted<M: Module>(
     (M::instantiate(&config, host.clone()).unwrap(), host)
 }
 
-/// A host that hands a law to the soil and keeps what it says.
+/// A host that hands a law to the soil and keeps its messages.
 pub struct Handed {
     plain: Standalone,
     law: Option<Arc<dyn NodeLaw>>,

@@ -8,7 +8,7 @@ use super::program::{LONGEST, Operation};
 pub struct Builder {
     operations: [Operation; LONGEST],
     length: usize,
-    /// More operations were asked for than there is room.
+    /// More operations were requested than there is room.
     full: bool,
 }
 

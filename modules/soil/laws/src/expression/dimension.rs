@@ -199,7 +199,7 @@ pub fn unit_dimension(
     Ok((dimension, factor))
 }
 
-/// A number, a name, or what stands in parentheses.
+/// A number, a name, or an expression in parentheses.
 fn exponent_text(rest: &str) -> &str {
     let end = if rest.starts_with('(') { rest.find(')').map(|k| k + 1) } else { rest.find([' ', '*', '/']) };
     &rest[..end.unwrap_or(rest.len())]

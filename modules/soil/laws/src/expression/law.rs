@@ -59,7 +59,7 @@ impl PressureExpression {
     pub fn at_size(&self, b: f64) -> Program {
         let bind = |v| if v == 1 { Binding::Constant(b) } else { Binding::Variable(v) };
         let (builder, root) = self.builder.rebind(self.root, bind);
-        // what fitted with b as a variable fits with b as a number
+        // a program that fits with b as a variable fits with b as a number
         Program::new(builder.operations(), root).unwrap_or(self.program)
     }
 }

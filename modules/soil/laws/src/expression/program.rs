@@ -95,7 +95,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Leaves out what the root does not need and gives every value a register; `None`: too many are needed at once.
+    /// Drops operations that the root does not need and assigns registers; `None`: too many are needed at once.
     pub fn new(operations: &[Operation], root: u8) -> Option<Self> {
         let mut last_use = [0usize; LONGEST];
         let mut needed = [false; LONGEST];

@@ -1,4 +1,4 @@
-//! The names that a law may use: what changes during a run, and parameters with unit and range.
+//! The names that a law may use: quantities that change during a run, and parameters with unit and range.
 
 use super::error::ExpressionError;
 use super::{Binary, Function};
@@ -35,7 +35,7 @@ impl Symbol {
         Self { name: name.into(), unit: unit.into(), role, value, range }
     }
 
-    /// A parameter that is what it is: its range is its value.
+    /// A constant parameter: its range is its value.
     pub fn fixed(name: &str, unit: &str, value: f64) -> Self {
         Self::new(name, unit, Role::Parameter, value, [value; 2])
     }

@@ -1,4 +1,4 @@
-//! The module soil-column as a dynamic library, and what its section says of it.
+//! The module soil-column as a dynamic library, with the description in its section.
 terraglue_plugin::export_subsystem! {
     soil_column::SoilColumnModule,
     kind: "soil",

@@ -40,7 +40,7 @@ fn open(world: &PhysicsWorld, robot: &Robot) -> [f64; 2] {
     })
 }
 
-/// What was seen in ten seconds.
+/// Figures of ten seconds.
 struct Seen {
     /// CPU time of every step, µs.
     times: Vec<f64>,

@@ -1,4 +1,4 @@
-/* What a master in C without any service costs: usage
+/* Cost of a master in C without any service: usage
    LIBRARY FMUS pair|chain record|blind save|go [GUID RESOURCES].
    Outputs of t become inputs, then every FMU steps; each output is kept in memory where it is recorded.
    Prints the least CPU time in µs per FMU and step. */

@@ -1,4 +1,4 @@
-//! What FMUs cost: per communication step beside a bare loop in C and other masters, over two cores, and in isolation.
+//! Cost of FMUs: per communication step against a bare loop in C and other masters, over two cores, and in isolation.
 
 mod exchange;
 pub mod peers;
@@ -26,7 +26,7 @@ pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
 /// Times that both are measured, one after the other; the least counts.
 const TURNS: u32 = 5;
 
-/// What a testbed costs over what another master costs, measured in turns; no line where that one cannot be measured.
+/// Cost of a testbed over that of another master, measured in turns; no line where that one cannot be measured.
 fn beside(folder: &Path, case: &steps::FmuCase, peer: &str) -> Option<Figure> {
     let (mut ours, mut theirs) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..TURNS {

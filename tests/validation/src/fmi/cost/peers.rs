@@ -31,7 +31,7 @@ fn measured(folder: &Path) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What a step of a case costs with another master, µs of CPU per FMU.
+/// Cost of a step of a case with another master, µs of CPU per FMU.
 pub fn cost(folder: &Path, case: &FmuCase, peer: &str) -> Outcome<f64> {
     let file = folder.join(format!("{}.fmu", fmu(case)));
     let mut child = command(&python()?, &[SCRIPT, peer]);
@@ -40,7 +40,7 @@ pub fn cost(folder: &Path, case: &FmuCase, peer: &str) -> Outcome<f64> {
     result(child).and_then(|t| t.trim().parse().map_err(|_| format!("it said {t}")))
 }
 
-/// What a script says after `RESULT`, or the last line of its complaint.
+/// The text that a script prints after `RESULT`, or the last line of its complaint.
 pub fn result(mut script: Command) -> Outcome<String> {
     script.env("LD_LIBRARY_PATH", target().join("peers-fmi/lib"));
     let output = script.output().map_err(|e| e.to_string())?;
@@ -52,7 +52,7 @@ pub fn result(mut script: Command) -> Outcome<String> {
     })
 }
 
-/// The Python of `target/peers-fmi`, with what could be installed of the peers.
+/// The Python of `target/peers-fmi`, with the peers that could be installed.
 pub fn python() -> Outcome<PathBuf> {
     let folder = target().join("peers-fmi");
     let python = folder.join("bin/python");

@@ -22,7 +22,7 @@ pub struct FmuCase {
     pub pair: bool,
 }
 
-/// What is measured, here and with other masters.
+/// Cases that are measured, here and with other masters.
 pub const CASES: [FmuCase; 4] = [
     FmuCase { name: "one", fmus: 1, pair: false },
     FmuCase { name: "pair", fmus: 2, pair: true },
@@ -40,7 +40,7 @@ struct Manner {
 /// Nothing recorded, no step taken back.
 const BLIND: Manner = Manner { record: false, save: false };
 
-/// What a step of a case costs in a testbed, µs of CPU per FMU.
+/// Cost of a step of a case in a testbed, µs of CPU per FMU.
 pub fn blind(folder: &Path, case: &FmuCase) -> Outcome<f64> {
     testbed(folder, case, BLIND)
 }

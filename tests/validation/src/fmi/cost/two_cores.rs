@@ -1,4 +1,4 @@
-//! What a second core brings to FMUs that cost more than 20 µs a step.
+//! Gain by a second core for FMUs that cost more than 20 µs a step.
 
 use super::super::{fmus, testbed_on};
 use crate::process::Outcome;
@@ -23,7 +23,7 @@ pub fn figure(folder: &Path) -> Outcome<Figure> {
     let on = |threads: usize| testbed_on(folder, &text, threads).map_err(|e| e.to_string());
     let (mut one, mut two) = (on(1)?, on(2)?);
     let mut best = [f64::INFINITY; 2];
-    // the first steps tell a testbed what its FMUs cost
+    // in the first steps a testbed measures the cost of its FMUs
     took(&mut one, 130)?;
     took(&mut two, 130)?;
     for _ in 0..TURNS {

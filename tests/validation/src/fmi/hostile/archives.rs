@@ -20,7 +20,7 @@ const LONGEST: Duration = Duration::from_secs(60);
 const ROUNDS: usize = 50_000;
 /// Written by the library as soon as it is loaded.
 const MARK: &str = "mark";
-/// What lies beside an archive: itself, and what was said of it.
+/// Expected files of a case: the archive, output, errors and temporary folder.
 const OWN: [&str; 4] = ["x.fmu", "output", "errors", "tmp"];
 
 /// Whether code of the FMU may run, must, or must not.
@@ -85,7 +85,7 @@ fn run(place: &Path, context: &Context, bytes: &[u8]) -> Outcome<Ended> {
     watched(run.env("HOSTILE_MARK", place.join(MARK)), place, LONGEST)
 }
 
-/// What is otherwise than promised.
+/// Deviations from the promised behaviour.
 fn judge(place: &Path, context: &Context, case: &Case, code: Code) -> Outcome<Vec<String>> {
     let ended = run(place, context, &case.bytes)?;
     let mut wrong = Vec::new();

@@ -1,5 +1,5 @@
-//! FMUs that misbehave at each stage of their life, in a scenario and alone, without and with isolation: the run tells it,
-//! or goes on unharmed; what it recorded is read, and nothing is left behind.
+//! FMUs that misbehave at each stage of their life, in a scenario and alone, without and with isolation: the run reports
+//! it, or goes on unharmed; its recording can be read, and nothing is left behind.
 
 use super::super::watched::{Ended, watched};
 use crate::parallel::in_parallel;
@@ -32,7 +32,7 @@ const WRONG: [(&str, &[&str]); 5] = [
 ];
 /// Floods of the log; there is none while the library is loaded.
 const LOGS: [&str; 4] = ["flood", "null", "utf", "huge"];
-/// Changes of the process, and what is left in it.
+/// Changes and remains in the process.
 const CHANGES: [&str; 8] = ["close", "folder", "locale", "mask", "signal", "round", "thread", "child"];
 /// Table of an FMU that is run alone.
 const TABLE: &str = "table.csv";
@@ -163,7 +163,7 @@ fn fmu(folder: &Path) -> Outcome<std::path::PathBuf> {
     Ok(fmu)
 }
 
-/// What is otherwise than promised.
+/// Deviations from the promised behaviour.
 fn judge(folder: &Path, context: &Context, fmu: &Path, case: Misbehaviour) -> Outcome<Vec<String>> {
     let place = folder.join(case.folder());
     let mut run = Command::new(&context.program);

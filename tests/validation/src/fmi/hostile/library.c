@@ -1,4 +1,4 @@
-/* A library of both versions that tells when its code runs: it writes the file HOSTILE_MARK while it is loaded. It calls a
+/* A library of both versions that shows when its code runs: it writes the file HOSTILE_MARK while it is loaded. It calls a
  * function of libm without being linked to it, as some tools build theirs. Its token is `g`. */
 #include <stdbool.h>
 #include <stdio.h>

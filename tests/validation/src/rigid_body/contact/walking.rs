@@ -34,7 +34,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What is looked at during a walk.
+/// Sums and maxima over a walk.
 #[derive(Default)]
 struct SeenWalk {
     penetration: f64,
@@ -96,9 +96,9 @@ fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
     ])
 }
 
-/// What the feet and forces of a walk were.
+/// Walks, and collects the figures of feet and forces.
 fn walked(walk: &mut GaitWalk) -> Outcome<SeenWalk> {
-    // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
+    // Bodies are in the order of the legs' joints, four to a leg, after the trunk.
     let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
     let normals = LEGS.map(|leg| walk.fixture.id(&format!("{leg}4.contact_normal")));
     let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;
@@ -135,7 +135,7 @@ fn walked(walk: &mut GaitWalk) -> Outcome<SeenWalk> {
     Ok(seen)
 }
 
-/// Median of a step and its 99th percentile over the median. Every run does the same steps, and what else the machine does
+/// Median of a step and its 99th percentile over the median. Every run does the same steps, and other work of the machine
 /// only adds to one: each step counts with the least of its times.
 fn cost(name: &str, model: &str, limit: f64) -> Outcome<Vec<Figure>> {
     let mut times = vec![f64::INFINITY; STEPS];

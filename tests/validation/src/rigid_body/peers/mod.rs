@@ -1,6 +1,6 @@
 //! The same cases on other engines, measured in the same run: MuJoCo and Rapier, installed by name.
 //!
-//! Only in the long run with timing; where an engine cannot be had its line says `skip`.
+//! Only in the long run with timing; where an engine cannot be had its line has `skip`.
 
 mod mujoco;
 mod rapier;
@@ -51,7 +51,7 @@ fn measure(command: &mut Command, id: &str, name: &str) -> Outcome<Vec<Figure>> 
     Ok(String::from_utf8_lossy(&output.stdout).lines().filter_map(figure).collect())
 }
 
-/// What is not a number is told as such and fails nothing: it is the peer's.
+/// A value that is not a number is reported as such and fails nothing: it is the peer's.
 fn peer_figure(id: String, value: f64, what: String) -> Figure {
     if value.is_finite() {
         Figure::new(id, value, Limit::None, what).noisy()

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 const SCRIPT: &str = "tests/validation/src/rigid_body/peers/peer_mujoco.py";
 
-/// What measures it; `parts`: none but these.
+/// The command that measures it; `parts`: only these.
 pub fn command(parts: &[&str]) -> Outcome<Command> {
     let folder = reference("").display().to_string();
     let mut command = start(python()?, &[&root().join(SCRIPT).display().to_string(), &folder]);

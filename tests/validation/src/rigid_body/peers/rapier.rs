@@ -1,10 +1,10 @@
-//! Rapier's column: a small program of its own workspace, built here when it is first asked for.
+//! Rapier's column: a small program of its own workspace, built here on its first use.
 
 use super::reference;
 use crate::process::{Outcome, cargo, command as start, root, target};
 use std::process::Command;
 
-/// What measures it.
+/// The command that measures it.
 pub fn command() -> Outcome<Command> {
     let (manifest, place) =
         (root().join("tests/validation/peers/rapier/Cargo.toml"), target().join("peers/rapier"));

@@ -1,4 +1,4 @@
-//! The table that sets our figures beside those of the peers: `docs/rigid-body.md`.
+//! The table of our figures and those of the peers: `docs/rigid-body.md`.
 
 use crate::Figure;
 

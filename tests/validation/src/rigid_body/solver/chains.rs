@@ -18,7 +18,7 @@ const TIP: [(&str, &str, [f64; 3]); 4] = [
 const EXACT: f64 = 1e-6;
 const LINK: Vector3<f64> = Vector3::new(0.25, 0.0, 0.0);
 
-/// What a run leaves.
+/// Results of a run.
 struct ChainRun {
     /// Distance of the tip from the reference at 1 s, m.
     tip: f64,
@@ -29,7 +29,7 @@ struct ChainRun {
 }
 
 /// The spatial chain with a rule of second order. The one that conserves energy is held against the limit of the energy;
-/// what generalized-alpha, which damps what a step cannot resolve, makes of it is told beside it.
+/// that of generalized-alpha, which damps motion that a step cannot resolve, is reported only.
 fn spatial_second_order(integrator: &str) -> Outcome<Vec<Figure>> {
     let (file, joints, tip) = TIP[0];
     let [coarse, fine] = [1e-3, 5e-4].map(|h| run(file, joints, tip, integrator, h, 10.0));

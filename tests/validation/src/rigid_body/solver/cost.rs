@@ -1,4 +1,4 @@
-//! What a further trial of the same step costs the hexapod: the gluing's re-solve with the factor that stands.
+//! Cost of a further trial of the same step of the hexapod: the gluing's re-solve with the factor that stands.
 
 use crate::process::{Outcome, root};
 use crate::timing::{cpu_s, median};

@@ -105,7 +105,7 @@ fn windows(context: &Context, scheme: &str, n: usize) -> Outcome<Vec<Figure>> {
     let id = format!("rigid-body.a02_n{n}.{scheme}");
     let energy = match run(&mut fixture, 10.0) {
         Ok(energy) => energy,
-        // The long row of windows is told, not judged.
+        // The long row of windows is reported, not judged.
         Err(e) if n != 2 => return Ok(vec![Figure::skipped(format!("{id}.place"), e)]),
         Err(e) => return Ok(vec![Figure::new(format!("{id}.place"), f64::NAN, Limit::AtMost(1e-4), e)]),
     };

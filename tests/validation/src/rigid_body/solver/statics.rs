@@ -1,4 +1,4 @@
-//! What joints carry at rest, against sums of weights.
+//! Loads of joints at rest, against sums of weights.
 
 use crate::process::Outcome;
 use crate::rigid_body::fixture::{Fixture, G};

@@ -42,7 +42,7 @@ fn exact(t: f64) -> [f64; 2] {
     [y[0], y[2]]
 }
 
-/// What a run leaves.
+/// Results of a run.
 struct TopRun {
     /// Angle between the axis and the exact one at the end, rad.
     axis: f64,

@@ -1,4 +1,4 @@
-//! What the automaton costs: six feet, two threads, old ground, collapses, rates, memory. CPU time of the thread that
+//! Cost of the automaton: six feet, two threads, old ground, collapses, rates, memory. CPU time of the thread that
 //! does the work, so that a busy machine shows less.
 
 use super::cone::released;
@@ -45,7 +45,7 @@ impl Spread {
         Self([at(0.5), at(0.99), 1e3 * times.iter().sum::<f64>() / times.len() as f64])
     }
 
-    /// The best of several runs, number by number: what disturbs a run only adds to it.
+    /// The best of several runs, number by number: disturbances of a run only add to it.
     fn best(runs: u32, run: impl Fn() -> Vec<f64>) -> Self {
         (0..runs)
             .map(|_| Self::of(run()))

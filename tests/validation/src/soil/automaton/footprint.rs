@@ -1,4 +1,4 @@
-//! What a foot leaves behind: slope of the rim, curvature, and where the material of the crater went.
+//! The footprint: slope of the rim, curvature, and the destination of the material of the crater.
 
 use super::feet::{Feet, Soil, instance, shape};
 use super::field::{Function, largest_curvature};
@@ -94,7 +94,7 @@ fn lost(soil: &Soil) -> i64 {
     sunk - soil.material().compaction().total()
 }
 
-/// A print in a dry sand whose row of the table says that no cohesion holds its walls, with every other key as it is by default.
+/// A print in a dry sand without cohesion in its row of the table, with every other key as it is by default.
 fn sand(spacing: f64) -> Figure {
     Figure::new(
         format!("soil.automaton.print.dry_sand_{}mm.slides", spacing * 1e3),

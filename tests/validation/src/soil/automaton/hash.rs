@@ -13,7 +13,7 @@ use terraglue_subsystem::Subsystem;
 
 /// Steps of a run, quick and otherwise.
 const STEPS: [u32; 2] = [300, 3000];
-/// What the C library does without: fused multiply-add and wide vectors.
+/// Features withheld from the C library: fused multiply-add and wide vectors.
 const WITHOUT: &str = "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX,-AVX2,-AVX512F,-AVX512VL,-AVX2_Usable,-FMA_Usable";
 
 /// Hills with heaps that slide for a long time, five bodies among them.

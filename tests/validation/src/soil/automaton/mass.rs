@@ -38,7 +38,7 @@ pub fn wander(fixture: &mut Feet, wanderers: &mut [Wanderer]) {
     fixture.step(|k| goals[k]);
 }
 
-/// Units of mass gained and those that the soil itself says it has gained.
+/// Units of mass gained and those that the soil itself reports.
 pub fn figure(context: &Context) -> Outcome<Figure> {
     let steps = if context.quick { 5_000 } else { 1_000_000 };
     let machine = Arc::new(Machine::new(Box::new(hills(101)), 1));

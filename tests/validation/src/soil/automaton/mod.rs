@@ -19,7 +19,7 @@ pub use picture::write_picture;
 use crate::process::Outcome;
 use crate::{Context, Figure};
 
-/// κ_max where a scenario is silent, 1/m.
+/// Default of κ_max, 1/m.
 const CURVATURE: f64 = 40.0;
 
 /// All figures but those that a clock measures.
@@ -33,7 +33,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What the automaton costs; nothing where no clock is to be read.
+/// Cost of the automaton; nothing where no clock is to be read.
 pub fn cost(context: &Context) -> Outcome<Vec<Figure>> {
     if !context.timing {
         return Ok(Vec::new());

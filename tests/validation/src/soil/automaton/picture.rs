@@ -1,4 +1,4 @@
-//! `cargo xtask pictures`: the crater of a foot beside its pressure–sinkage curve, as an SVG file for docs/soil.md.
+//! `cargo xtask pictures`: the crater of a foot next to its pressure–sinkage curve, as an SVG file for docs/soil.md.
 
 use super::feet::{Feet, instance};
 use super::field::Function;

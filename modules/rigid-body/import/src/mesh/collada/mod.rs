@@ -1,8 +1,8 @@
-//! COLLADA 1.4 and 1.5 (`.dae`): the triangles of the scene, each part as often as it stands there.
+//! COLLADA 1.4 and 1.5 (`.dae`): the triangles of the scene, each part as often as it is instantiated.
 //!
 //! Transforms of nodes and `<unit meter="…">` count. `<up_axis>` does not: RViz, Gazebo and MoveIt take coordinates as they
-//! stand, and robot files are made to look right there. What has no triangles of its own (skins, splines, references to
-//! other files) is refused by its line; materials, lights and cameras are nobody's business here.
+//! are, and robot files are made to look right there. Elements without triangles of their own (skins, splines, references
+//! to other files) are refused by their line; materials, lights and cameras are ignored.
 
 mod geometry;
 
@@ -46,7 +46,7 @@ pub(super) fn read(text: &str) -> Result<Scene, String> {
     Ok(Scene { triangles: reader.triangles, up })
 }
 
-/// Elements by id, geometries that were read, and what was found.
+/// Elements by id, geometries that were read, and the triangles found.
 struct ColladaReader<'a> {
     ids: HashMap<&'a str, Node<'a, 'a>>,
     known: HashMap<&'a str, Vec<Triangle>>,
@@ -136,7 +136,7 @@ fn referred<'a>(
     ids.get(id).copied().ok_or_else(|| wrong(node, &format!("there is no element with the id `{id}`")))
 }
 
-/// The step from a node to what it holds, if this element is one.
+/// The transform from a node to its children, if this element is one.
 fn transform(part: Node) -> Result<Option<Matrix4<f64>>, String> {
     let step = match part.tag_name().name() {
         "matrix" => Matrix4::from_row_slice(&numbers::<16>(part)?),

@@ -88,7 +88,7 @@ class Soil:
         self.testbed.restore(state)
 
     def trial(self, position, orientation=None):
-        """What `step` would return; nothing is kept."""
+        """The result that `step` would return; nothing is kept."""
         before = self.snapshot()
         try:
             return self.step(position, orientation)

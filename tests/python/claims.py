@@ -111,7 +111,7 @@ def simulated(scenario, options):
 
 
 def of_run(scenario, options, read):
-    """What `read` finds in summary and columns of a run."""
+    """The value that `read` finds in summary and columns of a run."""
     WANTED.append((scenario, options))
     return lambda: read(*started()[scenario, options].result())
 

@@ -159,7 +159,7 @@ def form_is_wrong(command, helps):
 
 
 def cargo_is_wrong(text):
-    """What `cargo bench` and `cargo test` name and the workspace does not have."""
+    """Targets that `cargo bench` and `cargo test` name and the workspace does not have."""
     manifests = {p: p.read_text() for p in ROOT.glob("**/Cargo.toml") if "target" not in p.relative_to(ROOT).parts}
     for package in re.findall(r"(?:-p|--package) (\S+)", text):
         if not any(f'name = "{package}"' in manifest for manifest in manifests.values()):
@@ -221,7 +221,7 @@ def plant(place, name):
 
 
 def module_folder(place, name):
-    """What `terraglue new soil my-soil --lang c` and `make` leave."""
+    """The folder after `terraglue new soil my-soil --lang c` and `make`."""
     made = place / ".made"
     made.mkdir()
     assert terraglue("new", "soil", "my-soil", "--lang", "c", cwd=made).returncode == 0

@@ -31,7 +31,7 @@ fn input(message: impl ToString) -> Error {
     let message = message.to_string();
     // an error of the system has a cure of its own
     let help = (!message.contains("(os error "))
-        .then(|| "docs/fmi.md tells what is read of FMUs, and how they are run".into());
+        .then(|| "docs/fmi.md lists the supported parts of FMI".into());
     InputError::plain(message, help).into()
 }
 

@@ -190,7 +190,7 @@ fn shown(name: &str, search: &SearchPath, module_path: &[PathBuf]) -> Result<Exi
         }
     };
     let d = m.description.clone().unwrap_or_default();
-    let kind = if d.kind.is_empty() { "kind not told".into() } else { d.kind.clone() };
+    let kind = if d.kind.is_empty() { "kind unknown".into() } else { d.kind.clone() };
     outln!("{} ({kind})\n{}", m.name, m.path.display());
     let facts = [("version", &d.version), ("ABI", &d.abi), ("licence", &d.license), ("authors", &d.authors)];
     for (what, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {

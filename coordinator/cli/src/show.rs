@@ -77,10 +77,10 @@ fn way_out(error: &InputError) -> String {
         return ROBOT_FILES.into();
     }
     if let (true, Some("TG02")) = (is_shown, number) {
-        return "a path is relative to the folder of the scenario; docs/plugins/errors.md tells more causes of TG02".into();
+        return "a path is relative to the folder of the scenario; docs/plugins/errors.md lists more causes of TG02".into();
     }
     if let Some(number) = number {
-        return format!("docs/plugins/errors.md tells causes and cures of {number}");
+        return format!("docs/plugins/errors.md lists causes and cures of {number}");
     }
     if is_shown {
         return keys_of(error);
@@ -100,8 +100,8 @@ fn way_out(error: &InputError) -> String {
         () if message.contains("which module `") => {
             "give it with --set, as --set soil.parameters=LETE_sand gives all numbers of a soil"
         }
-        () if names(message, &FMUS) => "docs/fmi.md tells what is read of FMUs and system structures",
-        () => "`terraglue COMMAND --help` tells what the command takes",
+        () if names(message, &FMUS) => "docs/fmi.md lists the supported parts of FMI and SSP",
+        () => "`terraglue COMMAND --help` lists the arguments of the command",
     }
     .into()
 }

@@ -84,7 +84,7 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
         let contact = s.text("kind") == "contact";
         let mu = s.number("mu");
         if s.number("damping_n_s_m") > 0.0 && (contact || s.number("compliance_m_n") == 0.0) {
-            let message = "a damper stands beside the spring of a joint: give compliance_m_n too".into();
+            let message = "a joint has a damper only next to its spring: give compliance_m_n too".into();
             return Err(s.error("damping_n_s_m", message, None));
         }
         if s.number("ramp_s") > 0.0 && (contact || s.number("compliance_m_n") > 0.0) {

@@ -55,7 +55,7 @@ fn suspects(scenario: &Scenario) -> String {
     let names: Vec<String> = here.map(|s| format!("`{}`", s.name)).collect();
     match &names[..] {
         [one] => one.clone(),
-        several => format!("one of {} (`isolate = true` tells which)", several.join(", ")),
+        several => format!("one of {} (`isolate = true` shows which)", several.join(", ")),
     }
 }
 

@@ -34,7 +34,7 @@ pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>, spacing: Option<f6
         ColorType::GrayscaleAlpha => 2,
         _ => {
             let help = "convert it to greyscale; 16 bits keep small differences of height";
-            return Err(input(path, "a coloured image says nothing about heights".into(), Some(help)));
+            return Err(input(path, "a coloured image contains no heights".into(), Some(help)));
         }
     };
     let wide = frame.bit_depth == BitDepth::Sixteen;

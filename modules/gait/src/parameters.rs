@@ -103,7 +103,7 @@ fn ground() -> Vec<Parameter> {
         Parameter::of(
             "touch_down",
             ParameterType::Text,
-            "What ends a swing: the force on the foot, or the time",
+            "End of a swing: by the force on the foot, or by the time",
         )
         .or("contact")
         .choices(&["contact", "time"]),

@@ -15,8 +15,8 @@ persist!(Faults { values });
 pub(crate) const COUNT: usize = 9;
 /// Names, units, bounds and help, in the order of their ids.
 const ALL: [(&str, &str, [f64; 2], &str); COUNT] = [
-    ("blind", "", [0.0, 1.0], "1: it tells nothing"),
-    ("frozen", "", [0.0, 1.0], "1: it tells the last turn again and again"),
+    ("blind", "", [0.0, 1.0], "1: it sends nothing"),
+    ("frozen", "", [0.0, 1.0], "1: it repeats the last turn"),
     ("blocked_from", "rad", [-TAU, TAU], "First azimuth of a sector in which something hides everything"),
     ("blocked_to", "rad", [-TAU, TAU], "Last azimuth of that sector; none where it is the first one"),
     ("bias_m", "m", [-10.0, 10.0], "Added to all ranges"),

@@ -277,7 +277,7 @@ fn describe_actuator(id: u32, name: &str, kind: Kind, j: &JointState, all: &mut 
         format!("{name}.voltage_target"),
         "V",
         Causality::Input,
-        "What a motor in the mode `voltage` gets at its terminals",
+        "Voltage at the terminals of a motor in the mode `voltage`",
     );
     all.extend(Some(target).filter(|_| a.has(Group::Dc)));
     for (item, (what, of, _, help, _)) in ACTUATOR_ITEMS.iter().enumerate().filter(|(_, i)| has(i.2)) {
@@ -322,10 +322,10 @@ fn describe_moving(id: u32, name: &str, kind: Kind, all: &mut Vec<Variable>) {
     };
     real(ANGLE, "angle", angle, Causality::Output, "Coordinate of the joint");
     real(VELOCITY, "velocity", rate, Causality::Output, "Rate of the joint");
-    real(TORQUE, "torque", torque, Causality::Output, "What the motor gave in the last step");
+    real(TORQUE, "torque", torque, Causality::Output, "Torque of the motor in the last step");
     real(ANGLE_TARGET, "angle_target", angle, Causality::Input, "Where a position motor wants to be");
     real(VELOCITY_TARGET, "velocity_target", rate, Causality::Input, "Rate that the motor wants");
-    real(TORQUE_TARGET, "torque_target", torque, Causality::Input, "What a torque motor gives");
+    real(TORQUE_TARGET, "torque_target", torque, Causality::Input, "Torque that a torque motor is to give");
     real(MAX_TORQUE, "max_torque", torque, Causality::Parameter, "Largest magnitude of the motor's torque");
     real(STIFFNESS, "stiffness", stiffness, Causality::Parameter, "Stiffness of the position motor");
     real(DAMPING, "damping", damping, Causality::Parameter, "Damping of the position motor");
@@ -535,7 +535,7 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
         )),
         Meaning::Share(_) => Err(Error::Refused("the share of a divided link can be read only".into())),
         Meaning::Robot(_) | Meaning::RedundantRows => {
-            Err(Error::Refused("what the robot as a whole tells can be read only".into()))
+            Err(Error::Refused("variables of the robot as a whole are read only".into()))
         }
         Meaning::Closure { item: CLOSURE_BROKEN, .. } => Err(wrong_type(id)),
         Meaning::Closure { .. } => Err(Error::Refused("what a connection carries can be read only".into())),
@@ -552,7 +552,7 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
             Ok(())
         }
         Meaning::Joint { item: ACTUATOR..SETTING, .. } => {
-            Err(Error::Refused("what an actuator tells can be read only".into()))
+            Err(Error::Refused("this variable of an actuator is read only".into()))
         }
         Meaning::Joint { joint, item: item @ (ANGLE | VELOCITY) } => {
             initial::set_joint(model, state, joint, item == VELOCITY, value)

@@ -88,7 +88,7 @@ impl SensorKind {
         if !self.is_mounted() {
             for (k, (name, unit)) in self.channels().iter().enumerate() {
                 let (id, name) = (k as u32, format!("true_{name}"));
-                all.push(Variable::real(id, name, unit, Causality::Input, "What is measured"));
+                all.push(Variable::real(id, name, unit, Causality::Input, "The measured quantity"));
             }
         }
         // a switch shows no number
@@ -99,7 +99,7 @@ impl SensorKind {
                 *name,
                 unit,
                 Causality::Output,
-                "What the sensor shows",
+                "Reading of the sensor",
             ));
         }
         if let Some(name) = self.switch() {

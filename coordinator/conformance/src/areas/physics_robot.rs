@@ -42,7 +42,7 @@ fn mass(fixture: &BodyFixture) -> f64 {
 fn single(fixture: &BodyFixture) -> Verdict {
     match fixture.robot.scene().bodies.len() {
         1 if mass(fixture) > 0.0 => Ok(()),
-        1 => Err(Stop::Skip("its body has no mass in the scene: momentum cannot be told".into())),
+        1 => Err(Stop::Skip("its body has no mass in the scene: its momentum is unknown".into())),
         _ => Err(Stop::Skip("several bodies: the scene does not tell where their masses lie".into())),
     }
 }

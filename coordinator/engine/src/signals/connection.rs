@@ -82,7 +82,7 @@ impl Link {
         let source = &instances[self.from];
         line.take(moment, &self.numbers[..n], |slopes| {
             if !source.derivatives(&self.ids[..n], By::Time, slopes)? {
-                let why = "it tells no derivatives of these outputs, or NaN".to_owned();
+                let why = "it has no derivatives of these outputs, or NaN".to_owned();
                 return Err(source.error("output_derivatives", why));
             }
             slopes.iter_mut().zip(&self.numbers[n..2 * n]).for_each(|(slope, factor)| *slope *= factor);

@@ -201,7 +201,7 @@ impl Sight<'_> {
             ),
             (Passes::AlongDerivative, n) => (
                 n.to_string(),
-                "read at the start of a step; the input follows the derivative that its source tells".to_owned(),
+                "read at the start of a step; the input follows the derivative that its source provides".to_owned(),
             ),
             (Passes::AtStart, 1) => {
                 ("1".to_owned(), "read at the start of a step and held to its end".to_owned())

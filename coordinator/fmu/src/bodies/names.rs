@@ -219,7 +219,7 @@ fn hint<'a>(name: &str, all: impl Iterator<Item = &'a str>) -> String {
 fn fits(body: &Body, keys: &Map<String, Value>) -> Result {
     if let Some(k) = (0..3).find(|k| body.force[*k].is_some() && body.position[*k].is_none()) {
         let axis = "xyz".as_bytes()[k] as char;
-        return Err(wrong(&body.name, &format!("takes a force along {axis} but tells no position")));
+        return Err(wrong(&body.name, &format!("takes a force along {axis} but has no position")));
     }
     match OF_TURNING.iter().find(|key| keys.contains_key(**key)) {
         Some(key) if body.orientation.is_none() => Err(wrong(

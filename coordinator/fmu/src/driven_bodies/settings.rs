@@ -27,7 +27,7 @@ pub fn schema() -> Schema {
     Schema {
         name: NAME.into(),
         kind: Kind::Robot,
-        help: "Shapes that go where they are told; tells the forces that meet them".into(),
+        help: "Shapes on prescribed paths, with the forces on them".into(),
         parameters: vec![
             Parameter::of("count", ParameterType::Integer, "Number of feet").or(1).within(1.0, MOST),
             Parameter::of("shape", ParameterType::Text, "Shape of every foot")

@@ -200,7 +200,7 @@ fn pressure(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
     let across = Some(("sinkage".to_owned(), "m".to_owned()));
     let panel = Panel { across, ..Panel::new("mean pressure", "Pa", curves) };
     let note =
-        "Mean pressure below each contact over its sinkage, loading and unloading; as the soil tells.".into();
+        "Mean pressure below each contact over its sinkage, loading and unloading; from the outputs of the soil.".into();
     let title = "Pressure over sinkage".into();
     let figure = Figure { id: "pressure", title, note, panels: vec![panel], ..Figure::default() };
     (!figure.panels[0].curves.is_empty()).then_some(figure)
@@ -232,7 +232,7 @@ fn contacts(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
         Panel::new(&quantity.replace('_', " "), unit, curves)
     };
     let panels: Vec<Panel> = shown.map(panel).filter(|p| !p.curves.is_empty()).collect();
-    let note = "As the soil tells after each commit; contacts in the order of their first touch.".into();
+    let note = "Outputs of the soil after each commit; contacts in the order of their first touch.".into();
     let figure =
         Figure { id: "contacts", title: "Wheels and feet".into(), note, panels, ..Figure::default() };
     (!figure.panels.is_empty()).then_some(figure)

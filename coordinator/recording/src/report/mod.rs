@@ -61,7 +61,7 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
     if let Some(summary) = summary {
         page.section("Where the energy went", "energies", &energy_card::render(&summary.energy.energies));
     }
-    page.section("What was simulated", "setup", &setup::render(recording));
+    page.section("Simulated system", "setup", &setup::render(recording));
     if let Some(map) = ground_map::data(recording, &legs)? {
         page.section("The ground from above", "ground", ground_map::FRAME);
         page.data("map", map);

@@ -89,7 +89,7 @@ fn times(package: &Package, network: &Network, notes: &mut Vec<String>) -> Resul
     let experiments = || network.parts.iter().map(|p| p.description.experiment);
     let longest = experiments().filter_map(|e| e.stop).reduce(f64::max);
     let duration = structure.stop_s.or(longest).unwrap_or_else(|| {
-        notes.push("nobody says how long: time.duration_s = 1".into());
+        notes.push("the system gives no stop time: time.duration_s = 1".into());
         1.0
     });
     let own = network

@@ -57,7 +57,7 @@ impl Module for Everything {
             help: "Tries every call".into(),
             parameters: vec![
                 Parameter::number("start", "m", 0.25, "First state").within(-1.0, f64::INFINITY),
-                Parameter::of("fault", ParameterType::Text, "What goes wrong").or("none").choices(&[
+                Parameter::of("fault", ParameterType::Text, "The fault to show").or("none").choices(&[
                     "none",
                     "panic",
                     "discard",
@@ -116,7 +116,7 @@ impl Module for Everything {
                 encoding: "protobuf".into(),
                 rate_hz: 12.5,
                 most_bytes: 4096,
-                help: "What is seen".into(),
+                help: "Heights that are seen".into(),
             }],
             message: Vec::new(),
         }))

@@ -114,7 +114,7 @@ fn expand(runs: &[f64], soils: usize, nodes: usize) -> Result<Vec<u8>> {
         numbers.extend(std::iter::repeat_n(soil as u8, count as usize));
     }
     if numbers.len() != nodes {
-        let text = format!("`mask.runs` speaks of {} nodes, the ground has {nodes}", numbers.len());
+        let text = format!("`mask.runs` has {} nodes, the ground has {nodes}", numbers.len());
         return Err(Error::Refused(text));
     }
     Ok(numbers)
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused_with_the_reason() {
         for (text, reason) in [
-            (r#"{"soils":[{}],"runs":[11,0]}"#, "speaks of 11 nodes, the ground has 12"),
+            (r#"{"soils":[{}],"runs":[11,0]}"#, "has 11 nodes, the ground has 12"),
             (r#"{"soils":[{}],"runs":[13,0]}"#, "do not fit"),
             (r#"{"soils":[{}],"runs":[12,2]}"#, "do not fit"),
             (r#"{"soils":[{}],"runs":[12]}"#, "do not fit"),

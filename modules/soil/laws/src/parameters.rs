@@ -286,7 +286,7 @@ impl SoilParameters {
             Parameter::of(
                 "contacts_shown",
                 ParameterType::Integer,
-                "of how many wheels and feet variables are told (contact1.slip, …), in the order of their first touch",
+                "number of wheels and feet that have variables of their own (contact1.slip, …), in the order of their first touch",
             )
             .or(0)
             .within(0.0, 64.0),

@@ -70,7 +70,7 @@ pub fn schema() -> Schema {
         Parameter::of(
             "knows_truth",
             ParameterType::Bool,
-            "Whether it is told where it is, to show by how much it is wrong",
+            "Whether it takes the true pose, to show by how much it is wrong",
         )
         .or(false),
         Parameter::number("shown_hz", "Hz", 1.0, "Most messages of the stream `match` per second").positive(),

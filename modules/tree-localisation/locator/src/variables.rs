@@ -119,7 +119,7 @@ fn quality() -> Vec<Variable> {
             ERROR,
             "error",
             "m",
-            "Distance of the pose that is believed from the true one, where that is told; else 0",
+            "Distance of the pose that is believed from the true one, where that is connected; else 0",
         ),
         count(BEYOND, "beyond", "Scans after which a pose was believed whose error exceeds its bound"),
     ]

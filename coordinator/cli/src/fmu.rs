@@ -30,8 +30,8 @@ pub fn fmu(command: &FmuCommand) -> Result<Exit> {
 fn input(message: impl ToString) -> Error {
     let message = message.to_string();
     // an error of the system has a cure of its own
-    let help = (!message.contains("(os error "))
-        .then(|| "docs/fmi.md lists the supported parts of FMI".into());
+    let help =
+        (!message.contains("(os error ")).then(|| "docs/fmi.md lists the supported parts of FMI".into());
     InputError::plain(message, help).into()
 }
 

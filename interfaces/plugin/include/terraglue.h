@@ -44,7 +44,7 @@
 #define TG_ABI_MINOR 1
 /* Success. */
 #define TG_OK 0
-/* The step is too long: `reached` (s) says how far it could go. The host may repeat with a shorter step. */
+/* The step is too long: `reached` (s) is how far it could go. The host may repeat with a shorter step. */
 #define TG_DISCARD 1
 /* A value, name or argument is not acceptable; the instance is unchanged and usable. Text: `last_error`. */
 #define TG_REFUSED 2
@@ -232,7 +232,7 @@
 #define TG_LOG_INFO 3
 /* Level of a log line. */
 #define TG_LOG_DEBUG 4
-/* What a call answers; anything else than the values below counts as `TG_FATAL`. */
+/* Status of a call; any value other than those below counts as `TG_FATAL`. */
 typedef int32_t tg_status;
 
 /* t_min <= T_n <= t_max, |T_t| <= mu T_n, residual x1 - x2 + compliance T.
@@ -261,7 +261,7 @@ typedef struct {
     uint32_t mask;
     /* First component of this port in packed vectors. */
     uint32_t first;
-    /* What this subsystem has there: index into its scene's bodies, or a cell, or a terminal. */
+    /* Index of the body of its scene, of the cell or of the terminal at this port. */
     uint32_t body;
     /* Id of the scene shape on the side of the body; UINT32_MAX: none. */
     uint32_t shape;
@@ -315,7 +315,7 @@ typedef struct {
     const tg_node *nodes;
 } tg_step;
 
-/* What acts on the ports during a trial; packed. Pointers that the kind does not use are null. */
+/* Input on the ports during a trial; packed. Pointers that the kind does not use are null. */
 typedef struct {
     /* TG_FORCE or TG_MOTION. */
     uint32_t kind;
@@ -337,7 +337,7 @@ typedef struct {
     const double *v;
 } tg_motion;
 
-/* Answer of a trial at its end; packed. The vectors come filled with NaN: what stays NaN is an error. */
+/* Answer of a trial at its end; packed. The vectors come filled with NaN: an entry that stays NaN is an error. */
 typedef struct {
     /* Own displacement X. */
     double *x;
@@ -498,7 +498,7 @@ typedef struct {
     uint32_t n_shapes;
 } tg_scene;
 
-/* What a shape is made of, for sensors. Since 3.1. */
+/* Material of a shape, for sensors. Since 3.1. */
 typedef struct {
     /* 0 unknown, 1 metal, 2 rock, 3 soil, 4 wood, 5 foliage, 6 glass, 7 water; from 16 on free. */
     uint32_t class_id;
@@ -524,7 +524,7 @@ typedef struct {
     uint32_t position;
     /* Id of that of its velocity, rad/s or m/s. */
     uint32_t velocity;
-    /* Id of that of what its motor gives, N m or N. */
+    /* Id of that of the torque or force of its motor, N m or N. */
     uint32_t torque;
     /* Id of that of the most that its motor can give, N m or N. */
     uint32_t torque_limit;
@@ -583,7 +583,7 @@ typedef struct {
     /* Energy turned into heat inside since the start; >= 0, never falls. */
     double dissipated;
     /* Work done on this subsystem through its ports since the start. Of a soil: by the wrench of its own law at the motion
-     * that was committed, not by the wrench that `commit` tells it. */
+     * that was committed, not by the wrench passed to `commit`. */
     double port_work;
     /* Mechanical work that its own motors have put in since the start. */
     double actuator_work;
@@ -727,7 +727,7 @@ typedef struct {
      * must not depend on the order. A job must not throw or unwind. No module makes threads of its own.
      * When: in a call of the instance. Thread: that of the call, or of a job. */
     tg_status (*parallel_for)(void *ctx, size_t n, tg_job job, void *arg);
-    /* 1: the user asked to stop; long calls look at it.
+    /* 1: the user requested a stop; long calls poll it.
      * When: from `instantiate` to `free`. Thread: any. */
     int32_t (*cancelled)(void *ctx);
     /* Seed for everything random in this instance. */
@@ -740,7 +740,7 @@ typedef struct {
     double gravity[3];
     /* The ground at the start; null: the scenario has none. */
     const tg_terrain *terrain;
-    /* Largest number of ground nodes that a step may show; a hint for what to reserve. */
+    /* Largest number of ground nodes that a step may show; a hint for the memory to reserve. */
     uint32_t max_nodes;
     /* 0. */
     uint32_t reserved;
@@ -779,9 +779,9 @@ typedef struct {
     double range;
 } tg_ray;
 
-/* What a ray met first. */
+/* First hit of a ray. */
 typedef struct {
-    /* Distance from the start, m; inf: nothing was met, and the rest says nothing. */
+    /* Distance from the start, m; inf: nothing was met, and the rest is meaningless. */
     double distance;
     /* Unit normal of the surface, world, against the ray. */
     double normal[3];
@@ -791,11 +791,11 @@ typedef struct {
     uint32_t body;
     /* Id of the shape; UINT32_MAX: the ground. */
     uint32_t shape;
-    /* What it is made of. */
+    /* Material of the shape. */
     tg_material material;
 } tg_ray_hit;
 
-/* What is not passed by. */
+/* Shapes and ground that a ray can meet. */
 typedef struct {
     /* Bits TG_SEES_SHAPES and TG_SEES_GROUND. */
     uint32_t sees;
@@ -806,9 +806,9 @@ typedef struct {
     tg_body_ref skip;
 } tg_ray_mask;
 
-/* The committed world at the end of a step, and within the step interpolated to the time asked for; valid during
- * `observe` only, and to be called from its thread. Nothing of what comes after the step is known. An answer depends on the
- * question and the committed states alone. Asked outside of `observe` it answers nothing, and the call counts as TG_FATAL. */
+/* The committed world at the end of a step, and within the step interpolated to the requested time; valid during
+ * `observe` only, and to be called from its thread. Nothing after the step is known. An answer depends on the question and
+ * the committed states alone. Called outside of `observe` it returns nothing, and the call counts as TG_FATAL. */
 typedef struct {
     /* sizeof(tg_world) of the host. Entries beyond it count as null. */
     uint32_t size;
@@ -818,7 +818,7 @@ typedef struct {
     const char *const *subsystems;
     /* Changes whenever names or scenes of subsystems do. */
     uint64_t revision;
-    /* First and last time that can be asked for, s: the committed step. Times outside count as the nearest end. */
+    /* First and last time of a query, s: the committed step. Times outside count as the nearest end. */
     double interval[2];
     /* First argument of the functions below. */
     void *ctx;
@@ -884,7 +884,7 @@ typedef struct {
     const char *help;
     /* Most messages per second, 1/s; 0: whenever something happens. */
     double rate_hz;
-    /* Most bytes of a message. What is longer is left out with a warning. */
+    /* Most bytes of a message. Longer ones are dropped with a warning. */
     uint32_t most_bytes;
     /* 0. */
     uint32_t reserved;
@@ -892,13 +892,13 @@ typedef struct {
 
 /* A message of a stream. */
 typedef struct {
-    /* Time of what it tells, s. */
+    /* Time of its content, s. */
     double time;
     /* Its bytes; they stay valid until the next call that may change the committed state. */
     const uint8_t *bytes;
     /* Their number. */
     size_t size;
-    /* 1: the last committed step made a message; 0: it made none, and the rest says nothing. Comes as 0. */
+    /* 1: the last committed step made a message; 0: it made none, and the rest is meaningless. Comes as 0. */
     uint32_t is_there;
     /* 0. */
     uint32_t reserved;
@@ -908,7 +908,7 @@ typedef struct {
 typedef struct {
     /* Name of the layer. */
     const char *layer;
-    /* What a text says; else null. */
+    /* Text of a TG_TEXT; else null. */
     const char *text;
     /* Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world, UINT32_MAX - 1: the body that
      * the parameter `mount` names. */
@@ -950,13 +950,13 @@ typedef struct {
     const char *(*schema)(void);
     /* Makes an instance. `config` is a JSON object with a value for every parameter of the schema that the
      * scenario sets or that has a default. May allocate, read files below host->folder and read the terrain.
-     * On failure *instance stays null and last_error(NULL) says why.
+     * On failure *instance stays null and last_error(NULL) has the reason.
      * When: at any time. Thread: any thread, several at once. */
     tg_status (*instantiate)(const tg_host *host, const char *config, void **instance);
     /* Ends an instance.
      * When: once, last. Thread: that of the instance. */
     void (*free)(void *instance);
-    /* Bits TG_CAN_...: what this instance can do.
+    /* Bits TG_CAN_...: the capabilities of this instance.
      * When: at any time after `instantiate`. Thread: that of the instance. */
     uint32_t (*capabilities)(void *instance);
     /* Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
@@ -971,7 +971,7 @@ typedef struct {
     const char *(*last_error)(void *instance);
     /* Required up to here; below, null means: not offered.
      *
-     * Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+     * Paper, step 1. The ports of this step (grounds come first). Returns the committed X, V and,
      * for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan phi, t_max), one
      * per port; a ground's x along n is its own surface x2 under the body.
      * When: in a step, before its trials; again when the step is repeated. Thread: that of the instance. */
@@ -1070,11 +1070,11 @@ typedef struct {
      * `capabilities`, `advance` and `last_error` are not. Null for the other kinds. */
     const tg_node_law *law;
     /* Since 3.1, as all below. Looks at the committed world: with the capability TG_CAN_SEE, after all instances have
-     * committed the step, which `step` shows without ports. What was seen belongs to the committed state: variables,
-     * streams and `save_state` tell it from t + h on. `world` is valid for the call only.
-     * When: once per step, after `commit`; at the start of a run with h = 0. Thread: that of the instance. */
+     * committed the step, which `step` shows without ports. Observations belong to the committed state: variables,
+     * streams and `save_state` contain it from t + h on. `world` is valid for the call only. When: once per step,
+     * after `commit`; at the start of a run with h = 0. Thread: that of the instance. */
     tg_status (*observe)(void *instance, const tg_step *step, const tg_world *world);
-    /* All joints of the scene, and their number; valid and constant until `free`. Null: none is told.
+    /* All joints of the scene, and their number; valid and constant until `free`. Null: none.
      * When: at any time after `instantiate`. Thread: that of the instance. */
     size_t (*scene_joints)(void *instance, const tg_joint **first);
     /* Materials of all shapes of the scene, in their order, and their number; valid and constant until `free`. Null: all
@@ -1088,12 +1088,11 @@ typedef struct {
     /* All streams, and their number; valid and constant until `free`.
      * When: at any time after `instantiate`. Thread: that of the instance. */
     size_t (*streams)(void *instance, const tg_stream **first);
-    /* The message that the last committed step made on a stream; may be asked for any number of times.
+    /* The message that the last committed step made on a stream; may be called any number of times.
      * When: at any time. Thread: that of the instance. */
     tg_status (*stream)(void *instance, size_t stream, tg_message *out);
-    /* What is shown beside the bodies, and its number; valid until the next call of the instance. Asked only when
-     * somebody looks.
-     * When: at any time. Thread: that of the instance. */
+    /* Overlays to show with the bodies, and their number; valid until the next call of the instance. Called only when
+     * they are displayed or recorded. When: at any time. Thread: that of the instance. */
     size_t (*overlays)(void *instance, const tg_overlay **first);
 } tg_subsystem;
 

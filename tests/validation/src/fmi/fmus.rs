@@ -43,7 +43,6 @@ int fmi2SerializedFMUstateSize(Fmu *u, void *s, size_t *n) { return 3; }
 int fmi2SerializeFMUstate(Fmu *u, void *s, char *b, size_t n) { return 3; }
 int fmi2DeSerializeFMUstate(Fmu *u, const char *b, size_t n, void **s) { return 3; }
 int fmi2SetRealInputDerivatives(Fmu *u, const unsigned *r, size_t n, const int *o, const double *x) { return 3; }
-int fmi2GetRealOutputDerivatives(Fmu *u, const unsigned *r, size_t n, const int *o, double *x) { return 3; }
 int fmi2CancelStep(Fmu *u) { return 3; }
 int fmi2GetStatus(Fmu *u, int k, int *x) { return 3; }
 int fmi2GetRealStatus(Fmu *u, int k, double *x) { return 3; }
@@ -54,6 +53,9 @@ int fmi2GetStringStatus(Fmu *u, int k, const char **x) { return 3; }
 
 /// Answer of an FMU without derivatives.
 const NO_SLOPE: &str = "int fmi2GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, double *x) { return 3; }";
+
+/// Answer of an FMU whose outputs have no derivatives by time.
+const NO_RATE: &str = "int fmi2GetRealOutputDerivatives(Fmu *u, const unsigned *r, size_t n, const int *o, double *x) { return 3; }";
 
 /// A variable: name, role (`p`arameter, `i`nput, `o`utput, output of a `s`tate, which no input is seen in at once) and start value.
 pub type Variable<'a> = (&'a str, char, f64);
@@ -69,7 +71,7 @@ pub fn build_with_slope(
 ) -> Outcome<PathBuf> {
     let last = variables.len() - 1;
     let code = format!(
-        "int fmi2GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, \
+        "{NO_RATE}\nint fmi2GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, \
          double *x) {{ double *v = u->v; v[{}] += 1; for (size_t i = 0; i < n; i++) x[i] = z[i] == {last} && k[0] == 0 ? ({slope}) * s[0] : 0; return 0; }}",
         last - 1
     );
@@ -78,7 +80,23 @@ pub fn build_with_slope(
 
 /// Builds an FMU; `calc` and `step` are bodies in C over the values `v` in the order of the variables.
 pub fn build(folder: &Path, name: &str, variables: &[Variable], calc: &str, step: &str) -> Outcome<PathBuf> {
-    compile(folder, name, variables, calc, step, NO_SLOPE, "")
+    compile(folder, name, variables, calc, step, &format!("{NO_SLOPE}\n{NO_RATE}"), "")
+}
+
+/// Builds an FMU that tells the first derivative by time of outputs: `rates` gives their numbers and the derivative in C.
+pub fn build_with_rates(
+    folder: &Path,
+    name: &str,
+    variables: &[Variable],
+    (calc, step): (&str, &str),
+    rates: &[(usize, &str)],
+) -> Outcome<PathBuf> {
+    let cases: String = rates.iter().map(|(k, rate)| format!("case {k}: x[i] = {rate}; break; ")).collect();
+    let code = format!(
+        "{NO_SLOPE}\nint fmi2GetRealOutputDerivatives(Fmu *u, const unsigned *r, size_t n, const int *o, double *x) {{ \
+         double *v = u->v; calc(v); for (size_t i = 0; i < n; i++) switch (r[i]) {{ {cases}default: return 3; }} return 0; }}"
+    );
+    compile(folder, name, variables, calc, step, &code, " maxOutputDerivativeOrder=\"1\"")
 }
 
 fn compile(

@@ -1,8 +1,9 @@
-//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, the order of a step, cycles of life, cost, the reference
-//! FMUs, those of other tools.
+//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, the order of a step and its error over cost,
+//! cycles of life, cost, the reference FMUs, those of other tools.
 
 mod cost;
 mod cycles;
+mod error_over_cost;
 pub(super) mod fmus;
 mod folder;
 mod hostile;
@@ -24,11 +25,12 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 12] = [
+pub const PARTS: [Part; 13] = [
     ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
     ("turning", |context| turning::figures(&workplace(context)?)),
     ("loops", |context| loops::figures(&workplace(context)?)),
     ("order", |context| order::figures(&workplace(context)?)),
+    ("error-over-cost", |context| error_over_cost::figures(&workplace(context)?, !context.quick)),
     ("master", |context| master::figures(&workplace(context)?, context)),
     ("cycles", |context| cycles::figures(&workplace(context)?, context.quick)),
     ("archives", |context| hostile::archives::figures(&workplace(context)?, context)),

@@ -648,7 +648,8 @@ pub struct FmuRunArguments {
     /// Names to write, separated by commas [default: all outputs].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub output: Vec<String>,
-    /// Run it in a process of its own: a crash, a hang or an `exit` is an error.
+    /// Run it in a process of its own: a crash, a hang or an `exit` is an error. Advised for an FMU that was never run before: its code
+    /// is trusted otherwise.
     #[arg(long)]
     pub isolate: bool,
     /// Longest time from one row to the next where it is isolated, s.

@@ -1,9 +1,6 @@
 //! A short number that distinguishes two contents.
 
-/// FNV-1a of 64 bits (Fowler, Noll and Vo 1991): distinguishes builds or inputs; no protection against intent.
-pub fn fingerprint(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
-}
+pub use terraglue_subsystem::bytes::hash as fingerprint;
 
 #[cfg(test)]
 mod tests {

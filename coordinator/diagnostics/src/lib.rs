@@ -15,4 +15,4 @@ pub use check::{Complaint, LARGEST_WHOLE, allowed, allowed_values, check_value, 
 pub use error::{Error, Result};
 pub use fingerprint::fingerprint;
 pub use input_error::InputError;
-pub use nearest::{did_you_mean, nearest};
+pub use nearest::{closest, did_you_mean, nearest};

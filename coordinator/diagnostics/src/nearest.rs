@@ -1,11 +1,19 @@
 //! The nearest valid name to a wrong one, for every message about a name.
 
-/// The name of `names` nearest to `wrong` (Damerau–Levenshtein distance), when it is near enough to be meant.
+/// The name of `names` nearest to `wrong` (Damerau–Levenshtein distance), however far it is.
+pub fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    ranked(wrong, names).map(|(_, name)| name)
+}
+
+fn ranked<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<(usize, &'a str)> {
+    let wrong = wrong.to_lowercase();
+    let distance = |name: &str| strsim::damerau_levenshtein(&wrong, &name.to_lowercase());
+    names.into_iter().map(|name| (distance(name), name)).min_by_key(|(distance, _)| *distance)
+}
+
+/// The name of `names` nearest to `wrong`, when it is near enough to be meant.
 pub fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let (distance, name) = names
-        .into_iter()
-        .map(|name| (strsim::damerau_levenshtein(&wrong.to_lowercase(), &name.to_lowercase()), name))
-        .min_by_key(|(distance, _)| *distance)?;
+    let (distance, name) = ranked(wrong, names)?;
     let contained = wrong.len() >= 3 && (name.contains(wrong) || wrong.contains(name) && name.len() >= 3);
     (contained || distance <= 1 + wrong.len().max(name.len()) / 3).then_some(name)
 }

@@ -61,6 +61,9 @@ pub struct Participant {
     given_t: Vec<f64>,
     partner_x: Vec<f64>,
     partner_v: Vec<f64>,
+    /// T* and the free X of its components of the estimate.
+    t_star: Vec<f64>,
+    x_free: Vec<f64>,
     matrix: Vec<f64>,
     active: Vec<u8>,
     /// dX, dV and dA/d(wrench on itself) by differences of trials, own n × n, column-major; in use until the next ones.
@@ -105,9 +108,8 @@ impl Participant {
         }
         self.second = !self.ports.is_empty() && self.ports.iter().all(|p| p.side < 0);
         let n = self.n();
-        for buffer in
-            [&mut self.x, &mut self.v, &mut self.a, &mut self.t, &mut self.partner_x, &mut self.partner_v]
-        {
+        let own = [&mut self.x, &mut self.v, &mut self.a, &mut self.t, &mut self.t_star, &mut self.x_free];
+        for buffer in own.into_iter().chain([&mut self.partner_x, &mut self.partner_v]) {
             buffer.clear();
             buffer.resize(n, 0.0);
         }
@@ -221,16 +223,16 @@ impl Participant {
             return Ok(false);
         }
         let n = self.n();
-        Self::gather(&mut self.partner_x, &self.index, &estimate.t_star);
-        Self::gather(&mut self.partner_v, &self.index, &estimate.x_free);
+        Self::gather(&mut self.t_star, &self.index, &estimate.t_star);
+        Self::gather(&mut self.x_free, &self.index, &estimate.x_free);
         self.gather_matrix(&estimate.g, estimate.t_star.len());
         for (own, p) in self.active.iter_mut().zip(&self.port_index) {
             *own = estimate.active[*p];
         }
         let step = Self::step(&self.ports, n, nodes, at);
         let estimate = Estimate {
-            t_star: &mut self.partner_x,
-            x_free: &mut self.partner_v,
+            t_star: &mut self.t_star,
+            x_free: &mut self.x_free,
             g: &mut self.matrix,
             active: &mut self.active,
             unique: estimate.unique,

@@ -108,7 +108,9 @@ impl Refresh {
             Way::Analytic => true,
             Way::Frozen => !same,
             Way::Central | Way::Forward if before.is_nan() => true,
-            _ => !same || epoch != problem.at.epoch || h != problem.at.h || left > RATIO * before,
+            Way::Broyden | Way::Central | Way::Forward => {
+                !same || epoch != problem.at.epoch || h != problem.at.h || left > RATIO * before
+            }
         }
     }
 

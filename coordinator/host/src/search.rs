@@ -121,11 +121,8 @@ fn user_folder() -> Option<PathBuf> {
 
 /// The name that is most like one that was not found.
 pub(super) fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
-    let near = names
-        .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
-        .filter(|(likeness, _)| *likeness > 0.4)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    near.map(|(_, n)| n)
+    let names: Vec<String> = names.collect();
+    terraglue_diagnostics::nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::{Isolation, Workers};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use terraglue_subsystem::bytes::{hash, hash_from};
 use terraglue_subsystem::{Host, LogLevel, Terrain};
 
 /// Takes the log lines of instances: name of the instance, severity, text.
@@ -85,11 +86,7 @@ impl HostServices {
 /// the UTF-8 of the name, finished by the mix of SplitMix64 (Steele, Lea and Flood 2014). Part of the promise
 /// that a scenario gives the same bytes everywhere: it never changes.
 pub fn instance_seed(world_seed: u64, name: &str) -> u64 {
-    let bytes = world_seed.to_le_bytes();
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for byte in bytes.iter().chain(name.as_bytes()) {
-        hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-    }
+    let mut hash = hash_from(hash(&world_seed.to_le_bytes()), name.as_bytes());
     hash = (hash ^ (hash >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     hash = (hash ^ (hash >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     hash ^ (hash >> 31)

@@ -97,6 +97,72 @@ named! {
 }
 
 named! {
+    /// When within a step a connection passes its value: `order` of `[[connect]]`.
+    ConnectionOrder {
+        /// FMUs are stepped in the order of their structure where that avoids a delay.
+        Structure = "structure",
+        /// At the start of the step.
+        Jacobi = "jacobi",
+        /// The step is repeated until the value at its end is the one that it was made with.
+        Iterate = "iterate",
+    }
+}
+
+named! {
+    /// Extrapolation of an input over a step that begins with the output that feeds it: `extrapolate` of `[[connect]]`.
+    Extrapolate {
+        /// It is held.
+        Constant = "constant",
+        /// The line through the last two values.
+        Linear = "linear",
+        /// The line along the derivative that the source provides.
+        Derivatives = "derivatives",
+    }
+}
+
+named! {
+    /// Name of a fault: `kind` of `[[fault]]`.
+    FaultChoice {
+        /// A value of its own.
+        Override = "override",
+        /// Something is added.
+        Offset = "offset",
+        /// It is multiplied.
+        Gain = "gain",
+        /// Something is added that grows.
+        Ramp = "ramp",
+        /// The value of the moment is kept.
+        Freeze = "freeze",
+        /// The value comes late.
+        Delay = "delay",
+        /// Values get lost.
+        DropOut = "drop-out",
+        /// A random number is added.
+        Noise = "noise",
+    }
+}
+
+named! {
+    /// Form of the ground at the start: `terrain.kind`.
+    TerrainChoice {
+        /// A level.
+        Flat = "flat",
+        /// An inclined plane.
+        Slope = "slope",
+        /// Waves of random phase.
+        Undulating = "undulating",
+        /// A crater.
+        Crater = "crater",
+        /// A grid of heights as text.
+        EsriAscii = "esri-ascii",
+        /// An elevation model.
+        Geotiff = "geotiff",
+        /// An image whose greys are heights.
+        Png = "png",
+    }
+}
+
+named! {
     /// Where the interface Jacobian of the bodies comes from: `gluing.jacobian`.
     JacobianChoice {
         /// The modules' own derivatives.
@@ -112,6 +178,11 @@ named! {
         /// A control that is never refreshed.
         Frozen = "frozen",
     }
+}
+
+impl JacobianChoice {
+    /// The names that a scenario can choose; the others are controls of tests.
+    pub const OFFERED: &[&str] = Self::NAMES.split_at(4).0;
 }
 
 named! {

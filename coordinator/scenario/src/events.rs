@@ -1,10 +1,9 @@
 //! `[[connect]]`, `[[glue]]`, `[[event]]` and `[[fault]]`.
 
-use super::choices::StrategyKind;
+use super::choices::{ConnectionOrder, Extrapolate, FaultChoice, StrategyKind};
 use super::keys::{self, Table};
 use super::model::{
-    Comparison, Connection, ConnectionOrder, Entry, EventSpec, Extrapolate, FaultEnd, FaultKind, FaultSpec,
-    GlueSpec, Trigger,
+    Comparison, Connection, Entry, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec, Trigger,
 };
 use super::node::{Node, Raw};
 use super::section::Section;
@@ -26,15 +25,11 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             let message = format!("`to` has {stars_to} `*`, `from` only {stars_from} to fill them");
             return Err(s.error("to", message, None));
         }
-        let extrapolate = match s.text("extrapolate").as_str() {
-            "linear" => Extrapolate::Linear,
-            "derivatives" => Extrapolate::Derivatives,
-            _ => Extrapolate::Constant,
-        };
-        if extrapolate != Extrapolate::Constant && s.text("order") == "iterate" {
+        let extrapolate = Extrapolate::named(&s.text("extrapolate")).unwrap_or(Extrapolate::Constant);
+        let order = ConnectionOrder::named(&s.text("order")).unwrap_or(ConnectionOrder::Structure);
+        if extrapolate != Extrapolate::Constant && order == ConnectionOrder::Iterate {
             let message = format!(
-                "`extrapolate = \"{}\"` beside `order = \"iterate\"`, which finds the values of the step itself",
-                s.text("extrapolate")
+                "`extrapolate = \"{extrapolate}\"` beside `order = \"iterate\"`, which finds the values of the step itself"
             );
             return Err(s.error("extrapolate", message, Some("leave one of them out".into())));
         }
@@ -45,11 +40,7 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             factor: s.number("factor"),
             offset: s.number("offset"),
             convert: s.value("convert") != Value::Bool(false),
-            order: match s.text("order").as_str() {
-                "jacobi" => ConnectionOrder::Jacobi,
-                "iterate" => ConnectionOrder::Iterate,
-                _ => ConnectionOrder::Structure,
-            },
+            order,
             map: table(s)?,
             entry,
         })
@@ -176,15 +167,15 @@ pub fn faults(source: &Source, names: &[&str]) -> Checked<Vec<FaultSpec>> {
     each(source, "fault", |s, _, entry| {
         let variable = s.text("variable");
         check_reference(&variable, names).map_err(|c| s.error("variable", c.message, c.help))?;
-        let kind = match s.text("kind").as_str() {
-            "override" => FaultKind::Override(s.number("value")),
-            "offset" => FaultKind::Offset(s.number("value")),
-            "gain" => FaultKind::Gain(s.number("value")),
-            "ramp" => FaultKind::Ramp(s.number("rate_per_s")),
-            "delay" => FaultKind::Delay(s.number("delay_s")),
-            "drop-out" => FaultKind::DropOut(s.number("probability")),
-            "noise" => FaultKind::Noise(s.number("deviation")),
-            _ => FaultKind::Freeze,
+        let kind = match FaultChoice::named(&s.text("kind")).unwrap_or(FaultChoice::Freeze) {
+            FaultChoice::Override => FaultKind::Override(s.number("value")),
+            FaultChoice::Offset => FaultKind::Offset(s.number("value")),
+            FaultChoice::Gain => FaultKind::Gain(s.number("value")),
+            FaultChoice::Ramp => FaultKind::Ramp(s.number("rate_per_s")),
+            FaultChoice::Delay => FaultKind::Delay(s.number("delay_s")),
+            FaultChoice::DropOut => FaultKind::DropOut(s.number("probability")),
+            FaultChoice::Noise => FaultKind::Noise(s.number("deviation")),
+            FaultChoice::Freeze => FaultKind::Freeze,
         };
         let ends = [
             s.optional_number("until_s").map(|t| FaultEnd::At(Trigger::At(t))),

@@ -1,6 +1,9 @@
 //! Every key of the reserved tables, once: the parser, the JSON Schema and `docs/scenario.md` are made from here.
 
-use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
+use super::choices::{
+    ConnectionOrder, Extrapolate, FaultChoice, FormChoice, JacobianChoice, LevelChoice, Relaxation,
+    StartChoice, StrategyKind, TerrainChoice,
+};
 use terraglue_diagnostics::allowed;
 use terraglue_subsystem::{Parameter, ParameterType};
 
@@ -87,7 +90,7 @@ impl From<Parameter> for Key {
 /// The strategies of this version.
 pub const STRATEGIES: &[&str] = StrategyKind::NAMES;
 /// The kinds of terrain of this version.
-pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff", "png"];
+pub const TERRAIN_KINDS: &[&str] = TerrainChoice::NAMES;
 /// Kinds of terrain that are made, not read.
 const MADE: &[&str] = &["flat", "slope", "undulating", "crater"];
 /// Colours of the ground on a page.
@@ -236,7 +239,7 @@ fn gluing() -> Table {
             .into(),
         Parameter::of("jacobian", ParameterType::Text, "where the bodies' interface Jacobian comes from")
             .or("analytic")
-            .choices(JacobianChoice::NAMES)
+            .choices(JacobianChoice::OFFERED)
             .into(),
     ];
     keys.extend(gluing_of_steps());
@@ -270,14 +273,6 @@ fn gluing_of_steps() -> Vec<Key> {
             .optional()
             .positive()
             .into(),
-        number(
-            "start_scale",
-            "",
-            1.0,
-            "factor on the forces of joints at the start; other than 1 it is a control",
-        )
-        .within(0.0, 10.0)
-        .into(),
         number(
             "contact_margin_m",
             "m",
@@ -385,11 +380,11 @@ fn connect() -> Table {
             .into(),
         text("order", "structure: FMUs whose outputs depend on this input are stepped after the FMU that feeds it, so that the value is not late; jacobi: the input is the output of the start of the step; iterate: the FMUs of a loop repeat the step until the value at its end is the one that it was made with")
             .or("structure")
-            .choices(&["structure", "jacobi", "iterate"])
+            .choices(ConnectionOrder::NAMES)
             .into(),
         text("extrapolate", "where the input is read at the start of a step: constant: held as it was read; linear: it follows the line through the last two values, with the mean over the step of the target, or the value at its end where outputs follow inputs at once; derivatives: the same along the derivative of the output that an FMU tells (`maxOutputDerivativeOrder`)")
             .or("constant")
-            .choices(&["constant", "linear", "derivatives"])
+            .choices(Extrapolate::NAMES)
             .into(),
         Key::from(
             Parameter::of(
@@ -477,7 +472,6 @@ fn event() -> Table {
 }
 
 /// Kinds of faults.
-const FAULTS: &[&str] = &["override", "offset", "gain", "ramp", "freeze", "delay", "drop-out", "noise"];
 
 fn fault() -> Table {
     let text = |name, help| Parameter::of(name, ParameterType::Text, help);
@@ -489,7 +483,7 @@ fn fault() -> Table {
             "`subsystem.variable`: an output on all its connections, or an input; or `subsystem.stream`",
         )
         .into(),
-        text("kind", "what is wrong with its number").choices(FAULTS).into(),
+        text("kind", "what is wrong with its number").choices(FaultChoice::NAMES).into(),
         Key::from(value).only(&["override", "offset", "gain"]),
         Key::from(required("rate_per_s", "", "what is added grows by this")).only(&["ramp"]),
         Key::from(required("delay_s", "s", "how old the number is").positive()).only(&["delay"]),

@@ -39,7 +39,10 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 
-pub use choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
+pub use choices::{
+    ConnectionOrder, Extrapolate, FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice,
+    StrategyKind,
+};
 pub use difference::{Difference, differences};
 pub use ground_size::{SMALLER, TooMany, too_many};
 pub use isolation::IsolationSpec;

@@ -277,7 +277,7 @@ fn read_gluing(s: &Section) -> Checked<GluingSpec> {
         stabilisation: s.number("stabilisation"),
         energy_residual_j: s.optional_number("energy_residual_j"),
         step_min_s: s.optional_number("step_min_s"),
-        start_scale: s.number("start_scale"),
+        start_scale: usual.start_scale,
         contact_margin_m: s.number("contact_margin_m"),
     })
 }

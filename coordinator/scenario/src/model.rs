@@ -1,6 +1,9 @@
 //! A checked scenario: plain data that the testbed is built from.
 
-use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
+use super::choices::{
+    ConnectionOrder, Extrapolate, FaultChoice, FormChoice, JacobianChoice, LevelChoice, Relaxation,
+    StartChoice, StrategyKind,
+};
 use super::isolation::IsolationSpec;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -360,18 +363,6 @@ pub struct Entry {
     pub number: usize,
 }
 
-/// When within a step a connection passes its value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ConnectionOrder {
-    /// FMUs are stepped in the order of their structure where that avoids a delay.
-    #[default]
-    Structure,
-    /// At the start of the step.
-    Jacobi,
-    /// The step is repeated until the value at its end is the one that it was made with.
-    Iterate,
-}
-
 /// `[[connect]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
@@ -393,18 +384,6 @@ pub struct Connection {
     pub map: Vec<(String, Value)>,
     /// Where it stands.
     pub entry: Entry,
-}
-
-/// Extrapolation of an input over a step that begins with the output that feeds it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Extrapolate {
-    /// It is held.
-    #[default]
-    Constant,
-    /// The line through the last two values.
-    Linear,
-    /// The line along the derivative that the source provides.
-    Derivatives,
 }
 
 impl Default for GluingSpec {
@@ -516,14 +495,14 @@ impl FaultKind {
     /// As written in a scenario.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Override(_) => "override",
-            Self::Offset(_) => "offset",
-            Self::Gain(_) => "gain",
-            Self::Ramp(_) => "ramp",
-            Self::Freeze => "freeze",
-            Self::Delay(_) => "delay",
-            Self::DropOut(_) => "drop-out",
-            Self::Noise(_) => "noise",
+            Self::Override(_) => FaultChoice::Override.name(),
+            Self::Offset(_) => FaultChoice::Offset.name(),
+            Self::Gain(_) => FaultChoice::Gain.name(),
+            Self::Ramp(_) => FaultChoice::Ramp.name(),
+            Self::Freeze => FaultChoice::Freeze.name(),
+            Self::Delay(_) => FaultChoice::Delay.name(),
+            Self::DropOut(_) => FaultChoice::DropOut.name(),
+            Self::Noise(_) => FaultChoice::Noise.name(),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! `[terrain]`.
 
+use super::choices::TerrainChoice;
 use super::ground_size::{SMALLER, too_many};
 use super::keys::READ;
 use super::model::{Greys, TerrainKind, TerrainSpec};
@@ -8,21 +9,25 @@ use terraglue_diagnostics::InputError;
 
 /// Reads the checked table.
 pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
-    let kind = match s.text("kind").as_str() {
-        "slope" => {
+    let kind = match TerrainChoice::named(&s.text("kind")).unwrap_or(TerrainChoice::Flat) {
+        TerrainChoice::Slope => {
             TerrainKind::Slope { angle_rad: s.number("angle_rad"), heading_rad: s.number("heading_rad") }
         }
-        "undulating" => undulating(s)?,
-        "crater" => TerrainKind::Crater {
+        TerrainChoice::Undulating => undulating(s)?,
+        TerrainChoice::Crater => TerrainKind::Crater {
             diameter_m: s.number("diameter_m"),
             depth_m: s.number("depth_m"),
             rim_height_m: s.number("rim_height_m"),
             max_slope_rad: s.number("max_slope_rad"),
             centre_m: s.numbers("centre_m"),
         },
-        "esri-ascii" => TerrainKind::EsriAscii { file: s.file("file"), fill_m: s.optional_number("fill_m") },
-        "geotiff" => TerrainKind::Geotiff { file: s.file("file"), fill_m: s.optional_number("fill_m") },
-        "png" => TerrainKind::Png {
+        TerrainChoice::EsriAscii => {
+            TerrainKind::EsriAscii { file: s.file("file"), fill_m: s.optional_number("fill_m") }
+        }
+        TerrainChoice::Geotiff => {
+            TerrainKind::Geotiff { file: s.file("file"), fill_m: s.optional_number("fill_m") }
+        }
+        TerrainChoice::Png => TerrainKind::Png {
             file: s.file("file"),
             greys: Greys {
                 pixel_m: s.number("pixel_m"),
@@ -31,7 +36,7 @@ pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
             },
             fill_m: s.optional_number("fill_m"),
         },
-        _ => TerrainKind::Flat { height_m: s.number("height_m") },
+        TerrainChoice::Flat => TerrainKind::Flat { height_m: s.number("height_m") },
     };
     if s.optional_number("spacing_m").is_none() && !READ.contains(&s.text("kind").as_str()) {
         let help = Some("spacing_m: distance of lattice nodes, e.g. spacing_m = 0.01".into());

@@ -70,9 +70,14 @@ pub fn wrong(reason: &str) -> Error {
     Error::Refused(format!("these bytes are no state of this instance: {reason}"))
 }
 
-/// FNV-1a of 64 bits; also makes the mark of a state's owner.
+/// FNV-1a of 64 bits (Fowler, Noll and Vo 1991): distinguishes states, builds and inputs; no protection against intent.
 pub fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
+    hash_from(0xcbf2_9ce4_8422_2325, bytes)
+}
+
+/// The same continued: the hash of what gave `start`, followed by these bytes.
+pub fn hash_from(start: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(start, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Bytes of a state. `version` is that of its form, `mark` identifies its owner: the same model, the same ground.

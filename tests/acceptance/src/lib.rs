@@ -3,7 +3,7 @@
 pub mod step_times;
 
 use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
-use terraglue::scenario::Scenario;
+use terraglue::scenario::{GluingSpec, Scenario};
 use terraglue::testbed::Options;
 use terraglue::{Result, Testbed};
 
@@ -36,7 +36,16 @@ pub fn build(scenario: &Scenario) -> Result<Testbed> {
 /// # Errors
 /// As [`Testbed::build`], or a text that is no scenario.
 pub fn glued(text: &str) -> Result<Testbed> {
-    let scenario = Scenario::parse(text, "test.toml", &[])?;
+    glued_with(text, |_| ())
+}
+
+/// The same with other settings of the gluing than a scenario can name.
+///
+/// # Errors
+/// As [`glued`].
+pub fn glued_with(text: &str, set: impl FnOnce(&mut GluingSpec)) -> Result<Testbed> {
+    let mut scenario = Scenario::parse(text, "test.toml", &[])?;
+    set(&mut scenario.gluing);
     let library = terraglue::library()
         .with::<MassChain>()
         .with::<PlanarBodies>()

@@ -2,8 +2,9 @@
 //!
 //! Models, integrators and figures: `tests/reference/gluing/README.md`.
 
+use terraglue::scenario::JacobianChoice;
 use terraglue::{Result, Testbed};
-use terraglue_acceptance::{glued, read};
+use terraglue_acceptance::{glued, glued_with, read};
 use terraglue_numerics::extremes::larger;
 
 fn build(text: &str) -> Testbed {
@@ -83,7 +84,8 @@ fn jacobians_by_differences_give_the_same_motion() {
 
 #[test]
 fn a_frozen_jacobian_fails_when_the_rods_have_turned() {
-    let mut frozen = build(&pendulum("jacobian = \"frozen\""));
+    let frozen = glued_with(&pendulum(""), |gluing| gluing.jacobian = JacobianChoice::Frozen);
+    let mut frozen = frozen.unwrap_or_else(|e| panic!("{e}"));
     let failed = run(&mut frozen, 1.0).expect_err("a frozen Jacobian glues nothing that turns");
     println!("{failed}");
     assert!(failed.to_string().contains("the step was halved 4 times"), "{failed}");

@@ -1,7 +1,7 @@
 //! Variables of all subsystems by their full names, read and written as what a scenario can hold.
 
 use serde_json::Value;
-use terraglue_diagnostics::largest_plausible;
+use terraglue_diagnostics::{closest, largest_plausible};
 use terraglue_host::{Instance, Reply};
 use terraglue_subsystem::{Effect, Error, Result, ValueType, Values, ValuesMut, Variable};
 
@@ -78,8 +78,7 @@ impl Directory {
 }
 
 fn nearest<'a>(names: impl Iterator<Item = &'a String>, name: &str) -> Option<String> {
-    let distance = |n: &&String| strsim::damerau_levenshtein(n, name);
-    names.min_by_key(distance).map(|n| format!("did you mean `{n}`?"))
+    closest(name, names.map(String::as_str)).map(|n| format!("did you mean `{n}`?"))
 }
 
 impl VariableRef {

@@ -2,6 +2,7 @@
 
 use super::access::{Directory, VariableRef};
 use serde_json::Value;
+use terraglue_diagnostics::closest;
 use terraglue_host::Instance;
 use terraglue_scenario::{Comparison, EventSpec, InputError, Source, Trigger};
 use terraglue_subsystem::Effect;
@@ -157,8 +158,8 @@ fn check_action(action: &str, instances: &[Instance]) -> Result<(), (String, Opt
     if actions.iter().any(|a| a.name == name) {
         return Ok(());
     }
-    let nearest = actions.iter().min_by_key(|a| strsim::damerau_levenshtein(&a.name, name));
-    let help = nearest.map(|a| format!("did you mean `{subsystem}.{}`?", a.name));
+    let nearest = closest(name, actions.iter().map(|a| a.name.as_str()));
+    let help = nearest.map(|action| format!("did you mean `{subsystem}.{action}`?"));
     Err((format!("`{subsystem}` has no action `{name}`"), help))
 }
 

@@ -15,6 +15,7 @@ use terraglue_fmi::export::{
 use terraglue_fmi::{Fmu, Version};
 use terraglue_host::SearchPath;
 use terraglue_scenario::{InputError, Scenario, SubsystemSpec, find_soil_table};
+use terraglue_subsystem::bytes::{hash, hash_from};
 use terraglue_subsystem::{Capabilities, Config, ParameterType};
 use toml_edit::{DocumentMut, Item, value};
 
@@ -338,10 +339,10 @@ fn token(resources: &Path, request: &Request) -> Result<String> {
     let mut files = Vec::new();
     collect(resources, &mut files).map_err(|e| plain(format!("{}: {e}", resources.display())))?;
     files.sort();
-    let mut hashes = [0xcbf2_9ce4_8422_2325_u64, 0x8422_2325_cbf2_9ce4];
+    let mut hashes = [hash(&[]), 0x8422_2325_cbf2_9ce4];
     let mut feed = |bytes: &[u8]| {
         for hash in &mut hashes {
-            *hash = bytes.iter().fold(*hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3));
+            *hash = hash_from(*hash, bytes);
         }
     };
     feed(format!("{:?} {}", request.version, request.scalars).as_bytes());

@@ -233,7 +233,9 @@ impl TtForm {
                 self.e.push(match problem.conditions.kinds[i] {
                     _ if problem.component(i).is_given() => 0.0,
                     ConstraintKind::Law => problem.t[i] - problem.law.last[i],
-                    _ => problem.component(i).mismatch(),
+                    ConstraintKind::Normal | ConstraintKind::Joint | ConstraintKind::Coulomb => {
+                        problem.component(i).mismatch()
+                    }
                 });
             }
         }
@@ -369,7 +371,7 @@ impl TtForm {
         for (i, t) in problem.t.iter().enumerate() {
             match problem.conditions.kinds[i] {
                 ConstraintKind::Law => open[0] = open[0].max(self.e[i].abs()),
-                _ => {
+                ConstraintKind::Normal | ConstraintKind::Joint | ConstraintKind::Coulomb => {
                     let wanted = t - self.e[i] / self.matrix[i * n + i];
                     open[1] = open[1].max((t - wanted.max(self.lower[i]).min(self.upper[i])).abs());
                 }

@@ -5,6 +5,7 @@ use super::npz::array;
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read};
 use std::path::Path;
+use terraglue_numerics::extremes::smaller;
 use terraglue_tree_localisation::{
     Answer, Detector, LocalTree, Located, MapTree, MatchModel, Matcher, Point, Pose2, Prior, Scan, TreeMap,
 };
@@ -39,7 +40,7 @@ fn turn(folder: &Path, line: &str, id: &str, file: &str, limits: [f64; 2]) -> Ou
     let gap = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]);
     let trees: Vec<[f64; 2]> = truth.iter().map(|t| [t[0] - EYE[0], t[1] - EYE[1]]).collect();
     let near: Vec<_> = stems.iter().filter(|s| gap(s.place, [0.0; 2]) <= WITHIN).collect();
-    let errors = near.iter().map(|s| trees.iter().map(|t| gap(*t, s.place)).fold(f64::INFINITY, f64::min));
+    let errors = near.iter().map(|s| trees.iter().map(|t| gap(*t, s.place)).fold(f64::INFINITY, smaller));
     let errors: Vec<f64> = errors.filter(|e| *e < 0.5).collect();
     let seen = |k: &usize| owners.iter().filter(|o| **o == *k as f64).count() >= 10;
     let visible: Vec<usize> =

@@ -5,6 +5,7 @@ use crate::columns;
 use crate::parallel::in_parallel;
 use crate::process::{Outcome, run_scenario};
 use std::path::PathBuf;
+use terraglue_numerics::extremes::larger;
 
 /// A pose that is believed and farther from the truth is a wrong one, m.
 const WRONG: f64 = 1.0;
@@ -115,7 +116,7 @@ impl Told {
     fn head(&self) -> Vec<Figure> {
         let most = |[from, to]: [f64; 2], of: &[f64]| {
             let inside = self.time.iter().zip(of).filter(|(t, _)| **t > from && **t < to);
-            inside.map(|(_, v)| *v).fold(0.0, f64::max)
+            inside.map(|(_, v)| *v).fold(0.0, larger)
         };
         vec![
             Figure::new(

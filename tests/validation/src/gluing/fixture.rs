@@ -4,7 +4,7 @@ use crate::process::Outcome;
 use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
 use std::fmt::Write;
 use terraglue::Testbed;
-use terraglue::scenario::Scenario;
+use terraglue::scenario::{GluingSpec, Scenario};
 use terraglue::testbed::Options;
 use terraglue_numerics::extremes::larger;
 
@@ -56,7 +56,13 @@ pub fn list(values: &[f64]) -> String {
 
 /// Builds a scenario.
 pub fn build(text: &str) -> Outcome<Testbed> {
-    let scenario = Scenario::parse(text, "case.toml", &[]).map_err(|e| format!("{e}\n{text}"))?;
+    build_with(text, |_| ())
+}
+
+/// The same with other settings of the gluing than a scenario can name.
+pub fn build_with(text: &str, set: impl FnOnce(&mut GluingSpec)) -> Outcome<Testbed> {
+    let mut scenario = Scenario::parse(text, "case.toml", &[]).map_err(|e| format!("{e}\n{text}"))?;
+    set(&mut scenario.gluing);
     let library = terraglue::library()
         .with::<MassChain>()
         .with::<PlanarBodies>()

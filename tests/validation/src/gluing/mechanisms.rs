@@ -1,11 +1,12 @@
 //! Cut mechanisms with generalized-α: errors, order, evaluations, Jacobians, a wrong start; a block with friction.
 
 use super::extrapolate::steps_to;
-use super::fixture::{Setting, Tally, build, read, step, wrench};
+use super::fixture::{Setting, Tally, build, build_with, read, step, wrench};
 use super::planar::{ALPHA, Body, GRAVITY, Mechanism};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read as read_file, root};
 use std::f64::consts::FRAC_PI_2;
+use terraglue::scenario::JacobianChoice;
 use terraglue_numerics::extremes::{larger, smaller};
 
 /// A mechanism with its reference: a column of a table per angle.
@@ -226,8 +227,9 @@ fn against_the_uncut() -> Outcome<Vec<Figure>> {
 /// Jacobians by differences, by Broyden's update, and one that is never refreshed.
 fn jacobians() -> Outcome<Vec<Figure>> {
     let run = |jacobian: &str, steps: u64| {
-        let setting = Setting { gluing: format!("jacobian = \"{jacobian}\""), ..setting(0.005) };
-        let mut testbed = build(&double_pendulum().cut(&setting, ALPHA))?;
+        let kind = JacobianChoice::named(jacobian).ok_or("no such Jacobian")?;
+        let mut testbed =
+            build_with(&double_pendulum().cut(&setting(0.005), ALPHA), |gluing| gluing.jacobian = kind)?;
         let mut tally = Tally::default();
         step(&mut testbed, steps, |testbed| {
             tally.add(testbed);
@@ -269,8 +271,9 @@ fn wrong_start() -> Outcome<Vec<Figure>> {
         [("alpha_0.8", ALPHA, Limit::AtMost(1e-7)), ("trapezoid", trapezoid, Limit::AtLeast(5e-3))]
     {
         let at = |scale: f64| {
-            let gluing = format!("tolerance = 1e-10\nstart_scale = {scale:?}");
-            build(&double_pendulum().cut(&Setting { gluing, ..setting(0.005) }, integrator))
+            let gluing = "tolerance = 1e-10".to_owned();
+            let text = double_pendulum().cut(&Setting { gluing, ..setting(0.005) }, integrator);
+            build_with(&text, |gluing| gluing.start_scale = scale)
         };
         let (mut right, mut wrong) = (at(1.0)?, at(1.01)?);
         let mut last: f64 = 0.0;

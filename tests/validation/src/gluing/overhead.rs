@@ -21,6 +21,7 @@ use terraglue::subsystem::{
     Result, Scene, Schema, Step, Subsystem, Values, ValuesMut, Variable,
 };
 use terraglue::testbed::Options;
+use terraglue_numerics::extremes::smaller;
 
 const BLOCKS: usize = 41;
 const STEPS: u32 = 500;
@@ -141,7 +142,7 @@ fn measure() -> Outcome<[f64; 3]> {
         let figures = [per(exchanged(&testbed) - parts - inside), per(whole - inside), per(inside)];
         blocks.iter_mut().zip(figures).for_each(|(block, figure)| block.push(figure));
     }
-    let quickest = |block: &Vec<f64>| block.iter().copied().fold(f64::INFINITY, f64::min);
+    let quickest = |block: &Vec<f64>| block.iter().copied().fold(f64::INFINITY, smaller);
     let [exchange, _, _] = blocks.each_ref().map(quickest);
     let [_, whole, inside] = blocks.map(median);
     Ok([exchange, whole, inside])

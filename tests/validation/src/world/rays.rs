@@ -7,7 +7,7 @@ use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use random_scenes::{Heights, Piece, drawn, is_right, naive, rays, scenes, tolerance};
 use std::sync::Arc;
-use terraglue_numerics::extremes::larger;
+use terraglue_numerics::extremes::{larger, smaller};
 use terraglue_subsystem::RayHit;
 use terraglue_world::Parallel;
 
@@ -85,7 +85,7 @@ fn compared(seed: u64, bodies: usize, count: usize) -> Outcome<Tally> {
     let mut tally = Tally { rays: count, ..Tally::default() };
     for (ray, hit) in rays.iter().zip(cast(&world, &rays)) {
         let candidates = naive(&pieces, &[(0, &heights)], ray);
-        let nearest = candidates.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+        let nearest = candidates.iter().map(|c| c.distance).fold(f64::INFINITY, smaller);
         match is_right(&hit, &candidates) {
             Some(true) if hit.is_hit() => {
                 tally.hits += 1;

@@ -22,13 +22,17 @@ fn text(step_s: f64, gravity: f64, robots: &[(&str, String)], glue: &str) -> Str
 
 fn build(text: &str) -> Result<Testbed, String> {
     let scenario = Scenario::parse(text, "test.toml", &[]).map_err(|e| format!("{e}: {:?}", e.help))?;
+    build_scenario(&scenario)
+}
+
+fn build_scenario(scenario: &Scenario) -> Result<Testbed, String> {
     let options = Options { threads: 1, ..Options::default() };
     let library = terraglue::library()
         .with::<RigidBody>()
         .with::<SoilBekker>()
         .with::<SoilCellularAutomaton>()
         .with::<Gait>();
-    Testbed::build_with(&scenario, &options, &library).map_err(|e| e.to_string())
+    Testbed::build_with(scenario, &options, &library).map_err(|e| e.to_string())
 }
 
 /// Largest difference of these variables, evaluations per step and largest gap over so many steps.
@@ -228,6 +232,37 @@ fn a_cut_hexapod_stands_and_walks_on_soil_like_the_whole_one() {
             assert!(worst <= 4e-12 * f64::from(steps), "{soil}: {worst:e}");
         }
     }
+}
+
+/// What `scenarios/cut_robot.toml` says of itself: it is the robot of sand_walk, and takes the same way.
+#[test]
+fn the_shipped_cut_robot_walks_like_the_whole_one() {
+    let [mut whole, mut cut] = [
+        ("sand_walk", &[("soil.module", "soil-bekker"), ("gluing.strategy", "iterative")][..]),
+        ("cut_robot", &[]),
+    ]
+    .map(|(name, sets)| shipped(name, sets));
+    let mut worst = 0.0_f64;
+    while whole.t_s() < 1.0 {
+        for testbed in [&mut whole, &mut cut] {
+            testbed.step().unwrap_or_else(|e| panic!("{e}"));
+        }
+        for name in ["robot.body.x", "robot.body.y", "robot.body.z"] {
+            let read = |t: &Testbed| t.read(name).unwrap_or_else(|| panic!("no variable {name}"));
+            worst = larger(worst, (read(&whole) - read(&cut)).abs());
+        }
+    }
+    println!("{worst:e} m");
+    assert!(worst <= 1e-9, "{worst:e} m");
+    assert_eq!(whole.t_s(), cut.t_s());
+}
+
+/// A scenario of the folder, edited, with the modules of this test.
+fn shipped(name: &str, sets: &[(&str, &str)]) -> Testbed {
+    let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let path = format!("{ROOT}/scenarios/{name}.toml");
+    let scenario = Scenario::load(path.as_ref(), &sets).unwrap_or_else(|e| panic!("{e}: {:?}", e.help));
+    build_scenario(&scenario).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
 #[test]

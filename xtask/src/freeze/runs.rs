@@ -16,7 +16,7 @@ pub fn hashes(program: &Path, scratch: &Path) -> Outcome<Hashes> {
     let mut all = Hashes::new();
     for scenario in scenarios()? {
         for soil in SOILS {
-            for strategy in STRATEGIES {
+            for strategy in strategies(&scenario)? {
                 let name = format!("run.{scenario}.{soil}.{strategy}");
                 let recording = run(program, scratch, &scenario, soil, strategy)?;
                 all.extend(channels(&recording).map(|(channel, hash)| (format!("{name}.{channel}"), hash)));
@@ -24,6 +24,14 @@ pub fn hashes(program: &Path, scratch: &Path) -> Outcome<Hashes> {
         }
     }
     Ok(all)
+}
+
+/// The strategies of a scenario: single passes glue no joints.
+fn strategies(scenario: &str) -> Outcome<&'static [&'static str]> {
+    let path = root().join(format!("scenarios/{scenario}.toml"));
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let joints = text.lines().any(|line| line.trim() == "[[glue]]");
+    Ok(if joints { &["iterative"] } else { &STRATEGIES })
 }
 
 fn scenarios() -> Outcome<Vec<String>> {

@@ -216,7 +216,7 @@ impl Patches {
             gather_wall(self, (range.clone(), local.start), ground, n_z, &mut wall)?;
             if let Some(wheel) = &wheel {
                 // a rim pushes with its axle, however it turns
-                wall.arm = [wheel.radius, 0.0, 0.0];
+                wall.arm = wheel.axle();
             }
         }
         if let Some(wheel) = &wheel

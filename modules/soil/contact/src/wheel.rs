@@ -1,8 +1,8 @@
 //! Wheels: which contacts roll, how fast they slip, and the shifted peak of their stress.
 //!
 //! A wheel is recognised by its underside, not by its name: where the nodes lie on a circular cylinder, each of them is
-//! r·(n − ν) away from the lowest line, with ν the inward normal there. A flat foot, whose normals are all alike, and
-//! a sphere, which is round in both directions, do not roll.
+//! r·(m − ν) away from the lowest line, with ν the inward normal there and m that of the lowest line: the vertical, or that of a
+//! wheel that leans. A flat foot, whose normals are all alike, and a sphere, which is round in both directions, do not roll.
 
 use crate::contact_memory::Remembered;
 use crate::patch_nodes::PatchNodes;
@@ -36,6 +36,8 @@ pub struct Memory {
     pub radius: f64,
     /// Direction of travel along t1 and t2, as it was found last.
     pub heading: [f64; 2],
+    /// Lean as it was found last, see [`Wheel::lean`].
+    pub lean: f64,
 }
 
 /// A contact that can roll, at the start of a step.
@@ -45,6 +47,11 @@ pub struct Wheel {
     pub radius: f64,
     /// Direction of travel along t1 and t2, unit length; its sign is arbitrary.
     pub heading: [f64; 2],
+    /// Angle by which the axle leans out of the level: the normal m of the lowest line has the parts cos along n and sin across the
+    /// travel (n × heading), rad.
+    pub lean: f64,
+    /// Whether it rolls for the first time.
+    pub first: bool,
     /// Length of the loaded nodes across the travel, m.
     pub width: f64,
     /// Half the length of the contact along the travel, as the depth makes it, m.
@@ -69,10 +76,12 @@ impl Wheel {
         let least = if used().filter(whole).count() < FEW { 0.0 } else { WHOLE * spacing * spacing };
         let inner = || used().filter(move |k| nodes.area[*k] > least);
         let found = heading(inner().map(|k| nodes.facing[k].inward())).and_then(|heading| {
-            let radius = radius(inner().map(|k| (nodes.arm[k], nodes.facing[k].inward())), heading)?;
-            Some((heading, radius))
+            let lean = lean(inner().map(|k| nodes.facing[k].inward()), heading);
+            let radius = radius(inner().map(|k| (nodes.arm[k], nodes.facing[k].inward())), heading, lean)?;
+            Some((heading, lean, radius))
         });
-        let (heading, radius) = found.or((memory.radius > 0.0).then_some((memory.heading, memory.radius)))?;
+        let known = (memory.radius > 0.0).then_some((memory.heading, memory.lean, memory.radius));
+        let (heading, lean, radius) = found.or(known)?;
         let pressed = || used().filter(|k| nodes.depth[*k] > nodes.permanent[*k]);
         let across = |k: usize| nodes.arm[k][2] * heading[0] - nodes.arm[k][1] * heading[1];
         let (sum, mean) =
@@ -86,19 +95,28 @@ impl Wheel {
         Some(Self {
             radius,
             heading,
+            lean,
+            first: memory.radius == 0.0,
             // rows of cells of equal load scatter by (W² − Δ²)/12
             width: (12.0 * variance + spacing * spacing).sqrt(),
             length: (deepest * (2.0 * radius - deepest).max(0.0)).sqrt(),
-            memory: Memory { radius, heading, ..memory },
+            memory: Memory { radius, heading, lean, ..memory },
         })
     }
 
     /// Ways of the rim and of the axle along the heading for a motion `x` (n, t1, t2 and rotations), m.
     pub fn ways(&self, x: &[f64; 6]) -> [f64; 2] {
         let along = |v: [f64; 2]| v[0] * self.heading[0] + v[1] * self.heading[1];
-        // the axle lies r·n above the lowest point: θ × r·n along t1 and t2
-        let rim = along([self.radius * x[5], -self.radius * x[4]]);
+        // the axle lies r·m above the lowest line: θ × r·m along the heading
+        let (sin, cos) = (libm::sin(self.lean), libm::cos(self.lean));
+        let rim = self.radius * (cos * along([x[5], -x[4]]) - sin * x[3]);
         [rim, along([x[1], x[2]]) + rim]
+    }
+
+    /// The axle above the lowest line: along n, t1 and t2, m.
+    pub fn axle(&self) -> [f64; 3] {
+        let side = self.radius * libm::sin(self.lean);
+        [self.radius * libm::cos(self.lean), -side * self.heading[1], side * self.heading[0]]
     }
 
     /// Direction along t1 and t2 in which the wheel is driven: that of the larger way of rim and axle.
@@ -124,7 +142,7 @@ impl Wheel {
             return self.memory;
         }
         let now = ((rim - axle) * (rim + axle).signum() / way).clamp(-1.0, 1.0);
-        let share = (way / self.length.max(f64::MIN_POSITIVE)).min(1.0);
+        let share = if self.first { 1.0 } else { (way / self.length.max(f64::MIN_POSITIVE)).min(1.0) };
         let slip = self.memory.slip + share * (now - self.memory.slip);
         let forward = if axle.abs() > 1e-9 * way { axle > 0.0 } else { self.memory.forward };
         Memory { slip, forward, ..self.memory }
@@ -213,11 +231,25 @@ fn heading(normals: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 2]> 
     (length > 0.0).then(|| v.map(|c| sign * c / length))
 }
 
+/// Angle between the axle and the level, rad: all normals of a cylinder are across its axle.
+fn lean(normals: impl Iterator<Item = [f64; 3]>, heading: [f64; 2]) -> f64 {
+    let (up, across) = normals
+        .fold((0.0, 0.0), |(up, across), nu| (up + nu[0], across + nu[2] * heading[0] - nu[1] * heading[1]));
+    libm::atan2(across, up)
+}
+
 /// Radius of the circle on which the nodes lie; `None` where they lie on none.
-fn radius(nodes: impl Iterator<Item = ([f64; 3], [f64; 3])> + Clone, heading: [f64; 2]) -> Option<f64> {
+fn radius(
+    nodes: impl Iterator<Item = ([f64; 3], [f64; 3])> + Clone,
+    heading: [f64; 2],
+    lean: f64,
+) -> Option<f64> {
+    let (sin, cos) = (libm::sin(lean), libm::cos(lean));
     let pairs = nodes.map(|(arm, nu)| {
-        let plane = |v: [f64; 3]| [v[0], v[1] * heading[0] + v[2] * heading[1]];
-        (plane(arm), plane([1.0 - nu[0], -nu[1], -nu[2]]))
+        let across = |v: [f64; 3]| v[2] * heading[0] - v[1] * heading[1];
+        let plane = |v: [f64; 3]| [cos * v[0] + sin * across(v), v[1] * heading[0] + v[2] * heading[1]];
+        let [up, along] = plane(nu);
+        (plane(arm), [1.0 - up, -along])
     });
     let of = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
     let (product, square) = pairs.clone().fold((0.0, 0.0), |(p, s), (a, b)| (p + of(a, b), s + of(b, b)));
@@ -242,7 +274,7 @@ impl Remembered for Memory {
     }
 }
 
-terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading });
+terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading, lean });
 
 #[cfg(test)]
 mod tests {
@@ -293,6 +325,30 @@ mod tests {
             assert!((w.radius - RADIUS).abs() < 2e-2 * RADIUS, "{w:?}");
             let along = (w.heading[0] * libm::cos(angle) + w.heading[1] * libm::sin(angle)).abs();
             assert!(along > 1.0 - 1e-4 && (w.width - 0.11).abs() < 0.005, "{w:?}");
+        }
+    }
+
+    #[test]
+    fn a_wheel_may_lean() {
+        for lean in [-0.4, -0.1, 0.05, 0.3] {
+            let (mut nodes, (sin, cos)) = (PatchNodes::default(), (libm::sin(lean), libm::cos(lean)));
+            for i in -6..=6 {
+                for j in -5..=5 {
+                    let (x, y) = (0.01 * f64::from(i), 0.01 * f64::from(j));
+                    let root = (RADIUS * RADIUS - x * x).sqrt();
+                    // along the axle from the lowest point, and up from there
+                    let s = (y + sin * (RADIUS - root)) / cos;
+                    push(&mut nodes, [s * sin + cos * (RADIUS - root), x, y], [x / (cos * root), sin / cos]);
+                }
+            }
+            nodes.permanent.fill(-1.0);
+            let w = find(&nodes).expect("a wheel");
+            assert!((w.radius - RADIUS).abs() < 1e-9 && (w.lean + lean).abs() < 1e-9, "{w:?}");
+            // rolls about its axle, which leans: without slip, forward or back
+            let spin = [0.1 * sin, 0.0, 0.1 * cos];
+            let turn = |axis: [f64; 3]| [0.0, 0.1 * RADIUS, 0.0, axis[0], axis[1], axis[2]];
+            let [rim, _] = w.ways(&turn(spin));
+            assert!((rim - 0.1 * RADIUS).abs() < 1e-9, "{rim}");
         }
     }
 

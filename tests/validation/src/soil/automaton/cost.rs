@@ -128,7 +128,7 @@ fn old_ground(context: &Context) -> Outcome<Vec<Figure>> {
         Figure::new(
             "soil.automaton.memory.per_touched_cell",
             per_cell,
-            Limit::AtMost(16.0),
+            Limit::AtMost(20.0),
             "bytes of resident memory that a touched cell takes, everything counted",
         ),
     ])

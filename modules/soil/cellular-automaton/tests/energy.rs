@@ -146,42 +146,6 @@ fn dragged(kind: u32, step_mm: f64) -> [f64; 2] {
     sums
 }
 
-/// Side force over vertical force on a box that leans by 15° about its way and is dragged by 8 cm at the depth of 1 cm.
-fn side_force(spacing: f64, degrees: f64) -> f64 {
-    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(LETE, ground(spacing)));
-    let half = 0.5 * degrees.to_radians();
-    let orientation = [libm::cos(half), libm::sin(half), 0.0, 0.0];
-    let mut pose = Pose { position: [-0.05, 0.0013, low(1, orientation)], orientation };
-    fixture.add(&shape(1), pose);
-    for _ in 0..100 {
-        pose.position[2] -= 1e-4;
-        fixture.step(|_| pose);
-    }
-    let mut sums = [0.0; 2];
-    for k in 0..800 {
-        pose.position[0] += 1e-4;
-        fixture.step(|_| pose);
-        let force = fixture.force(0);
-        if k >= 400 {
-            sums = [sums[0] + force[1], sums[1] + force[2]];
-        }
-    }
-    sums[0] / sums[1]
-}
-
-/// Its underside gives the side force, −tan 15° of the load. (Its side, which is in the soil in a part of a cell, carried up to one and
-/// a half times the load the other way: it took the bed for loose soil that slides along, and so knew of no shear.)
-#[test]
-fn the_side_force_on_a_leaning_body_is_that_of_its_underside() {
-    let wanted = libm::tan(15.0_f64.to_radians());
-    let error = [0.01, 0.005].map(|spacing| {
-        let [left, right] = [15.0, -15.0].map(|degrees| side_force(spacing, degrees));
-        println!("{spacing}: {left} {right}");
-        larger((left + wanted).abs(), (right - wanted).abs())
-    });
-    assert!(error[0] <= 0.12 && error[1] <= 0.05, "{error:?} of the load");
-}
-
 /// Soil that is pressed out comes to its neighbours a few units of height at a time if steps are short: it is as loose
 /// as soil that comes at once.
 #[test]

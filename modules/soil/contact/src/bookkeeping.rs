@@ -390,7 +390,7 @@ impl Scene<'_> {
         let before = if n.stamp[k] != 0 { state.half } else { 0.0 };
         state.half = printed.max(before).min(n.spread[k].whole);
         (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
-        if n.spread[k].deepest(depth) <= n.bed[k] {
+        if depth <= n.bed[k] {
             // loose soil slides along with the foot: the bed below has not been sheared
             state.shear.slip = 0.0;
         }

@@ -63,11 +63,6 @@ impl Spread {
         2.0 * height / self.range / (c + (c * c + 4.0 * square * height / self.range).sqrt())
     }
 
-    /// Depth of the lowest point of an underside at the mean depth `depth`, m.
-    pub fn deepest(&self, depth: f64) -> f64 {
-        depth + self.low
-    }
-
     /// Depth of the lowest point of an underside at the mean depth `depth` below `top`, m.
     fn inside(&self, depth: f64, top: f64) -> f64 {
         depth - top + self.low

@@ -29,7 +29,8 @@ def test_slope(tmp_path):
     # two seconds at 0.15 m/s of rim speed
     assert way["gentle"] > 0.15 and way["steep"] < 0.5 * way["gentle"], way
     slip = [mean(steep, f"soil.contact{k}.slip") for k in range(1, 7)]
-    assert min(slip) > 0.3, slip
+    # every wheel slips, and the rover loses more than a third of the way of its rims
+    assert min(slip) > 0.25 and sum(slip) / len(slip) > 0.35, slip
     for rows, angle in ((gentle, 0.1745), (steep, 0.4015)):
         pull = sum(mean(rows, f"soil.contact{k}.pull") for k in range(1, 7))
         weight = 39.2 * 9.81

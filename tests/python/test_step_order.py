@@ -287,7 +287,7 @@ def test_an_input_follows_the_derivative_that_an_fmu_tells(tmp_path, version):
         # of the integral of 3 t² over each step, t² and 2 t are met and h² is not
         assert float(last["sum.x"]) == pytest.approx(64 - 4 * step**2, abs=1e-9)
     notes = json.loads((tmp_path / "out/exchange.json").read_text())["connections"]
-    assert "derivative that its source tells" in notes[0]["why"]
+    assert "derivative that its source provides" in notes[0]["why"]
 
 
 def test_a_source_without_derivatives_is_refused(tmp_path):

@@ -3,7 +3,7 @@
 import { decoder } from "terraglue/protobuf.js";
 
 const MESSAGE = 1, TIME = 2, ANSWER = 3, CALL = 2;
-const SILENT_TICKS = 5;
+const SILENT_TICKS = 10;
 const AGAIN_MS = [300, 600, 1200, 2500];
 
 const textOf = new TextDecoder();

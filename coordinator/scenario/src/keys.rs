@@ -471,8 +471,6 @@ fn event() -> Table {
     }
 }
 
-/// Kinds of faults.
-
 fn fault() -> Table {
     let text = |name, help| Parameter::of(name, ParameterType::Text, help);
     let seconds = |name, help| required(name, "s", help).within(0.0, f64::INFINITY);

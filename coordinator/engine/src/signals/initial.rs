@@ -37,17 +37,21 @@ pub fn initialize(links: &mut [Link], instances: &mut [Instance]) -> Result {
         }
         u = y;
     }
-    // A diverged iterate is no start for Newton.
-    newton(links, instances, start)
+    // A diverged iterate is no start for Newton. Derivatives that are wrong lead nowhere: differences may.
+    match newton(links, instances, start.clone(), true) {
+        Err(Error::Simulation { .. }) => newton(links, instances, start, false),
+        solved => solved,
+    }
 }
 
-fn newton(links: &mut [Link], instances: &mut [Instance], mut u: Vec<f64>) -> Result {
+/// `known`: with the derivatives that subsystems provide.
+fn newton(links: &mut [Link], instances: &mut [Instance], mut u: Vec<f64>, known: bool) -> Result {
     let mut residual = residual_at(links, instances, &u)?;
     for _ in 0..ITERATIONS {
         if size(&residual) <= SOLVED * scale(&u) {
             return write(links, instances, &u);
         }
-        let jacobian = differences(links, instances, &u, &residual)?;
+        let jacobian = differences(links, instances, &u, &residual, known)?;
         let Some(step) = solve(&jacobian, &residual) else { break };
         let mut share = 1.0;
         let (mut best, there) = (None, size(&residual));
@@ -81,13 +85,14 @@ fn differences(
     instances: &mut [Instance],
     u: &[f64],
     residual: &[f64],
+    by_derivatives: bool,
 ) -> Result<Vec<Vec<f64>>> {
     let mut columns = Vec::with_capacity(u.len());
     let mut at = u.to_vec();
     let places: Vec<[usize; 2]> =
         links.iter().enumerate().flat_map(|(l, link)| (0..link.count()).map(move |e| [l, e])).collect();
     for (k, [l, e]) in places.into_iter().enumerate() {
-        if let Some(mut column) = known(links, instances, l, e)? {
+        if by_derivatives && let Some(mut column) = known(links, instances, l, e)? {
             column[k] -= 1.0;
             columns.push(column);
             continue;
@@ -129,7 +134,7 @@ fn solve(columns: &[Vec<f64>], right: &[f64]) -> Option<Vec<f64>> {
 
 #[cold]
 fn unsolved(links: &mut [Link], instances: &mut [Instance], u: &[f64], residual: &[f64]) -> Result<Error> {
-    let matrix = differences(links, instances, u, residual)?;
+    let matrix = differences(links, instances, u, residual, false)?;
     // An input is in a loop where its own value comes back to it over other inputs.
     let n = u.len();
     let feeds = |from: usize, to: usize| (matrix[from][to] + f64::from(u8::from(from == to))).abs() > 1e-9;

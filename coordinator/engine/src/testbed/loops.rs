@@ -23,6 +23,9 @@ const MOST: u32 = 60;
 /// Largest difference of a value and the one that the step was made with, relative to the larger of it and 1e-3 in its unit.
 const TOLERANCE: f64 = 1e-10;
 
+/// Values that grow by this factor beyond those of start and first trial have no solution.
+const RUNAWAY: f64 = 1e6;
+
 /// The way out of a loop that cannot be iterated.
 pub(super) const NO_LOOP: &str =
     "leave `order = \"iterate\"` of its connections out: then values of a loop are late by a step";
@@ -46,6 +49,8 @@ pub(super) struct Loops {
     /// Values at the start of the step, and those that the trial was made with.
     start: Vec<f64>,
     guess: Vec<f64>,
+    /// Size of the values at start and first trial.
+    scale: Vec<f64>,
     newton: Newton,
     acceleration: Acceleration,
 }
@@ -58,6 +63,7 @@ impl Default for Loops {
             state: 0,
             start: Vec::new(),
             guess: Vec::new(),
+            scale: Vec::new(),
             newton: Newton::default(),
             acceleration: Acceleration::new(Relaxation::Anderson, 1.0),
         }
@@ -122,8 +128,14 @@ impl Loops {
         };
         self.start = self.links.iter().flat_map(values).collect();
         self.guess.clone_from(&self.start);
+        self.scale.clear();
         self.acceleration.begin();
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
+    }
+
+    /// Back to the state at the start of the step, from which a shorter one begins.
+    pub fn back(&self, instances: &mut [Instance]) -> Result {
+        self.members.iter().try_for_each(|slot| instances[*slot].restore_state(self.state))
     }
 
     /// Repeats the trials of the members until the values no longer change. Returns a message if a loop was not solved.
@@ -137,6 +149,9 @@ impl Loops {
         for _ in 0..MOST {
             if span.broken.load(Ordering::Relaxed) || self.stands(links, &subsystems.instances)? {
                 return Ok(None);
+            }
+            if self.runs_away() {
+                break;
             }
             self.members.iter().try_for_each(|slot| subsystems.instances[*slot].restore_state(self.state))?;
             self.set(links, &mut subsystems.instances)?;
@@ -167,12 +182,21 @@ impl Loops {
                 residual.push(value - guess);
             }
         }
+        if self.scale.is_empty() {
+            let sizes = self.guess.iter().zip(&*residual).map(|(u, r)| u.abs().max((u + r).abs()).max(1e-3));
+            self.scale.extend(sizes);
+        }
         if !stands {
             self.newton.solve(residual, links, instances)?;
             let step = self.acceleration.step(&self.guess);
             self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
         }
         Ok(stands)
+    }
+
+    /// Whether the guess has left all that start and first trial were of.
+    fn runs_away(&self) -> bool {
+        self.guess.iter().zip(&self.scale).any(|(guess, scale)| guess.abs() > RUNAWAY * scale)
     }
 
     /// Sets the inputs to what the guess makes of them.

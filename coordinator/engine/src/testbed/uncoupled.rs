@@ -75,10 +75,15 @@ impl Uncoupled {
         if !self.loops.is_empty() {
             let unsolved = self.loops.solve(&self.order, &mut span, links, subsystems)?;
             if unsolved.is_some() {
+                self.loops.back(&mut subsystems.instances)?;
                 return Ok(unsolved);
             }
         }
-        if span.broken.into_inner() { broken_trial(subsystems) } else { Ok(None) }
+        let discarded = if span.broken.into_inner() { broken_trial(subsystems)? } else { None };
+        if discarded.is_some() {
+            self.loops.back(&mut subsystems.instances)?;
+        }
+        Ok(discarded)
     }
 
     /// Trials of all that take outputs of the start of the step only.

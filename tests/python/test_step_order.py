@@ -101,6 +101,26 @@ def test_a_loop_of_gains_is_one_step_late(tmp_path):
     assert {n["delay"] for n in notes["connections"]} == {"1"} and len(notes["loops"]) == 1
 
 
+def test_a_loop_whose_step_is_halved_begins_at_its_start(parts, tmp_path):
+    spring = "if (t > 0.045 && t < 0.055 && h > 0.006) return 2; r[1] = -100.0 * r[0];"
+    build(tmp_path, "spring", SPRING, spring, depends="1")
+    (tmp_path / "mass.fmu").write_bytes((parts / "mass.fmu").read_bytes())
+    (tmp_path / "run").mkdir()
+    rows = sprung(tmp_path, tmp_path / "run", 0.01, 'order = "iterate"', 'order = "iterate"')
+    assert farthest(rows) < 1.1 * iterated(parts, tmp_path, 0.01)[1]
+
+
+def test_a_loop_whose_values_run_away_is_not_solved(tmp_path):
+    both = [("u", "input", 0.0, ""), ("y", "output", 0.0, "")]
+    build(tmp_path, "more", both, "r[1] = t > 0.035 ? 1.0 + r[0] : 0.0;", depends="1")
+    build(tmp_path, "same", both, "r[1] = r[0];", depends="1")
+    text = '[time]\nstep_s = 0.01\nduration_s = 0.1\n[a]\nfmu = "more.fmu"\n[b]\nfmu = "same.fmu"\n'
+    text += "".join(f'[[connect]]\nfrom = "{x}.y"\nto = "{y}.u"\norder = "iterate"\n' for x, y in ("ab", "ba"))
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 1 and "the loop of a, b was not solved" in done.stderr
+
+
 def iterated(parts, folder, step):
     """Energies over 2 s, and the largest error of the position relative to the amplitude, with the loop of mass and spring solved in
     each step."""

@@ -34,6 +34,26 @@ pub struct Link {
     extrapolation: Option<Box<Extrapolation>>,
 }
 
+/// Derivatives of all values of `links`, one behind the other, by an entry of the inputs that a link feeds; false where one is not known.
+///
+/// # Errors
+/// [`Error::Module`](terraglue_diagnostics::Error::Module): a subsystem fails.
+pub fn derivatives<'a>(
+    links: impl Iterator<Item = &'a Link>,
+    instances: &[Instance],
+    (by, entry): (&Link, usize),
+    mut out: &mut [f64],
+) -> Result<bool> {
+    for link in links {
+        let (own, rest) = out.split_at_mut(link.count());
+        if !link.derivatives(instances, by, entry, own)? {
+            return Ok(false);
+        }
+        out = rest;
+    }
+    Ok(true)
+}
+
 impl Link {
     #[inline]
     fn output_ids(&self) -> &[u32] {
@@ -132,13 +152,7 @@ impl Link {
     ///
     /// # Errors
     /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem fails.
-    pub fn derivatives(
-        &self,
-        instances: &[Instance],
-        other: &Self,
-        k: usize,
-        out: &mut [f64],
-    ) -> Result<bool> {
+    fn derivatives(&self, instances: &[Instance], other: &Self, k: usize, out: &mut [f64]) -> Result<bool> {
         out.fill(0.0);
         if self.from != other.to {
             return Ok(true);

@@ -5,7 +5,7 @@
 //! inputs, Newton with the Jacobian by directional derivatives where all subsystems of a column know them, else by
 //! differences.
 
-use super::connection::Link;
+use super::connection::{Link, derivatives};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::Instance;
 use terraglue_numerics::dense::Lu;
@@ -111,15 +111,7 @@ fn differences(
 /// dy/du of entry `e` of link `l`, where it is known without trying.
 fn known(links: &[Link], instances: &[Instance], l: usize, e: usize) -> Result<Option<Vec<f64>>> {
     let mut column = vec![0.0; links.iter().map(Link::count).sum()];
-    let mut rest = &mut column[..];
-    for link in links {
-        let (own, after) = rest.split_at_mut(link.count());
-        if !link.derivatives(instances, &links[l], e, own)? {
-            return Ok(None);
-        }
-        rest = after;
-    }
-    Ok(Some(column))
+    Ok(derivatives(links.iter(), instances, (&links[l], e), &mut column)?.then_some(column))
 }
 
 /// The step of Newton; none where the Jacobian is singular.

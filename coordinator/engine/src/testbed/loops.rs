@@ -153,7 +153,7 @@ impl Loops {
             if self.runs_away() {
                 break;
             }
-            self.members.iter().try_for_each(|slot| subsystems.instances[*slot].restore_state(self.state))?;
+            self.back(&mut subsystems.instances)?;
             self.set(links, &mut subsystems.instances)?;
             for level in 0..order.levels() {
                 span.level = level as u32;

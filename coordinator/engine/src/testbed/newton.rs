@@ -4,7 +4,7 @@
 //! section 2.2.11: directional derivatives at a communication point). D is what an output follows at once; that an input also acts through
 //! the step is of the order of its length and left to the iteration around it.
 
-use crate::signals::{Link, Links};
+use crate::signals::{Link, Links, derivatives};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_numerics::dense::Lu;
@@ -59,14 +59,9 @@ impl Newton {
         self.columns.resize(size * size, 0.0);
         let inputs = self.links.iter().flat_map(|k| (0..link(k).count()).map(move |entry| (link(k), entry)));
         for (column, (by, entry)) in self.columns.chunks_exact_mut(size).zip(inputs) {
-            let mut rest = column;
-            for of in self.links.iter().map(link) {
-                let (own, after) = rest.split_at_mut(of.count());
-                self.offered = of.derivatives(instances, by, entry, own)?;
-                if !self.offered {
-                    return Ok(false);
-                }
-                rest = after;
+            self.offered = derivatives(self.links.iter().map(link), instances, (by, entry), column)?;
+            if !self.offered {
+                return Ok(false);
             }
         }
         let columns = &self.columns;

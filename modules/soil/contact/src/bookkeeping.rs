@@ -390,10 +390,9 @@ impl Scene<'_> {
         let before = if n.stamp[k] != 0 { state.half } else { 0.0 };
         state.half = printed.max(before).min(n.spread[k].whole);
         (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
-        if depth <= n.bed[k] {
-            // loose soil slides along with the foot: the bed below has not been sheared
-            state.shear.slip = 0.0;
-        }
+        let part = n.spread[k].part_below(depth, n.bed[k]);
+        state.shear.slip = diluted(n.shear[k].slip, shear.state.slip, [state.part, part]);
+        state.part = part;
         state.stamp = ledger.stamp;
         ledger.max_sinkage = ledger
             .max_sinkage
@@ -498,6 +497,15 @@ impl Scene<'_> {
         turnover.heat += area * (shear.dissipated + damped);
         area * law.elastic_energy(&shear.state)
     }
+}
+
+/// Mean slip over the part of a cell that reaches into the bed, m, after a step in which the slip grew from `from` to `to` and that part from
+/// `before` to `now`: soil that the foot comes down on has not been sheared, and loose soil on the bed slides along with the foot.
+fn diluted(from: f64, to: f64, [before, now]: [f64; 2]) -> f64 {
+    if now <= 0.0 {
+        return 0.0;
+    }
+    to - from * (1.0 - before / now).max(0.0)
 }
 
 /// A node that carries nothing any more, of which the underside still reaches below the surface that it met: it stays in its print, where

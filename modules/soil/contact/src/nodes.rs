@@ -38,6 +38,8 @@ pub struct NodeState {
     pub energy: f64,
     /// Area that carried pressure at the last commit, m².
     pub area: f64,
+    /// Part of the cell in which the foot reached into the bed at the last commit.
+    pub part: f64,
     /// Committed pressure, Pa; > 0: a foot stands here.
     pub pressure: f64,
     /// Shear history of the present contact.
@@ -360,6 +362,7 @@ terraglue_subsystem::persist!(NodeState {
     loose,
     energy,
     area,
+    part,
     pressure,
     shear,
     stamp,

@@ -1,13 +1,13 @@
 //! The shape of the code that `cargo xtask architecture` holds: no cycle of files inside a crate, no type of too many fields or methods,
-//! no function of too many lines. It reads lines as rustfmt leaves them.
+//! no function of too many lines, no two types of one name in a crate. It reads lines as rustfmt leaves them.
 //!
 //! `tests/known-shapes.tsv` lists everything beyond a bound with its number, which may only fall.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Most fields of a type, most methods over all its `impl`s, and most lines of a function.
-const MOST: [(&str, usize); 3] = [("fields", 25), ("methods", 40), ("lines", 60)];
+/// Most fields of a type, most methods over all its `impl`s, most lines of a function, and most types of one name in a crate.
+const MOST: [(&str, usize); 4] = [("fields", 25), ("methods", 40), ("lines", 60), ("types of one name", 1)];
 
 /// Words before `fn`. The third is put together because a test looks for that word in code.
 const QUALIFIERS: [&str; 6] = ["pub", "const", concat!("un", "safe"), "extern", "\"C\"", "async"];
@@ -58,6 +58,7 @@ pub fn findings(root: &Path, crates: &[String]) -> Findings {
     for folder in crates {
         let sources = sources(&root.join(folder).join("src"));
         let mut counts = functions(&sources);
+        counts.extend(namesakes(&sources));
         // modules of tests have types of one name for each case
         counts.extend(if folder.starts_with("tests") { Findings::new() } else { types(&sources) });
         for ((kind, name), count) in counts {
@@ -149,6 +150,25 @@ fn types(sources: &[Source]) -> Findings {
         }
     }
     all
+}
+
+/// How many files of a crate declare a type of each name.
+fn namesakes(sources: &[Source]) -> Findings {
+    let mut all = Findings::new();
+    for source in sources {
+        let names: BTreeSet<&str> = source.lines.iter().filter_map(|line| declared(line)).collect();
+        for name in names {
+            *all.entry(("types of one name".to_owned(), name.to_owned())).or_default() += 1;
+        }
+    }
+    all
+}
+
+/// The name of a type where a line begins its declaration. An alias stands for another type and counts as none.
+fn declared(line: &str) -> Option<&str> {
+    let mut words = line.split_whitespace().skip_while(|w| w.starts_with("pub"));
+    words.next().filter(|w| ["struct", "enum", "trait", "union"].contains(w))?;
+    words.next()?.split(|c: char| !c.is_alphanumeric() && c != '_').next()
 }
 
 fn is_field(line: &str) -> bool {
@@ -280,6 +300,16 @@ mod tests {
         let types = types(&sources);
         assert_eq!((types[&of("fields", "A")], types[&of("methods", "A")]), (2, 2));
         assert_eq!(functions(&sources)[&of("lines", "a.rs clone")], 4);
+    }
+
+    #[test]
+    fn types_of_one_name_are_counted_by_file() {
+        let sources = [
+            source("a.rs", "pub(crate) struct A<T> {\nimpl A<u8> {\nenum B {"),
+            source("b.rs", "    pub enum A {\ntype B = u8;\npersist!(struct B"),
+        ];
+        let of = |name: &str| namesakes(&sources)[&("types of one name".to_owned(), name.to_owned())];
+        assert_eq!((of("A"), of("B")), (2, 1));
     }
 
     #[test]

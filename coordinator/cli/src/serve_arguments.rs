@@ -23,7 +23,7 @@ pub struct ServeArguments {
     pub threads: usize,
     /// Times real time, 0.001 to 1000; or `free`: as fast as it goes.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = pace)]
-    pub pace: Pace,
+    pub pace: TimesRealTime,
     /// Begin with a pause.
     #[arg(long)]
     pub paused: bool,
@@ -67,14 +67,16 @@ Examples:
 
 /// Times real time; none: as fast as it goes.
 #[derive(Clone, Copy, Debug)]
-pub struct Pace(pub Option<f64>);
+pub struct TimesRealTime(pub Option<f64>);
 
-fn pace(text: &str) -> std::result::Result<Pace, String> {
+fn pace(text: &str) -> std::result::Result<TimesRealTime, String> {
     if text == "free" {
-        return Ok(Pace(None));
+        return Ok(TimesRealTime(None));
     }
     let factor = text.parse::<f64>().ok().filter(|x| (1e-3..=1e3).contains(x));
-    factor.map(|x| Pace(Some(x))).ok_or_else(|| "a factor from 0.001 to 1000, or `free`, is wanted".into())
+    factor
+        .map(|x| TimesRealTime(Some(x)))
+        .ok_or_else(|| "a factor from 0.001 to 1000, or `free`, is wanted".into())
 }
 
 impl ServeArguments {

@@ -36,7 +36,7 @@ pub struct Stored {
 
 /// Where a chunk stands, and what is in it.
 #[derive(Clone, Debug)]
-struct Place {
+struct ChunkPlace {
     offset: u64,
     length: u64,
     /// First and last time, ns.
@@ -45,14 +45,14 @@ struct Place {
     channels: Vec<u16>,
 }
 
-impl Place {
+impl ChunkPlace {
     fn has(&self, channel: u16) -> bool {
         self.channels.binary_search(&channel).is_ok()
     }
 }
 
 /// Numbers of chunks with their messages, the last used at the end.
-type Kept = Vec<(usize, Arc<Vec<Stored>>)>;
+type RecentChunks = Vec<(usize, Arc<Vec<Stored>>)>;
 
 /// A recording that is looked into.
 pub struct ChunkFile {
@@ -62,11 +62,11 @@ pub struct ChunkFile {
     is_growing: bool,
     /// Up to where it was looked at.
     end: u64,
-    chunks: Vec<Place>,
+    chunks: Vec<ChunkPlace>,
     topics: BTreeMap<u16, TopicInfo>,
     schemas: BTreeMap<u16, (String, String, Vec<u8>)>,
     header: BTreeMap<String, String>,
-    kept: Mutex<Kept>,
+    kept: Mutex<RecentChunks>,
 }
 
 impl ChunkFile {
@@ -143,12 +143,12 @@ impl ChunkFile {
     }
 
     /// The chunk at the end of what is known, once the index of its channels is there behind it.
-    fn chunk_place(&self, length: u64) -> Result<Option<Place>> {
+    fn chunk_place(&self, length: u64) -> Result<Option<ChunkPlace>> {
         let Some(head) = self.read(self.end + HEAD as u64, 16)? else { return Ok(None) };
         let time = |k: usize| head[k..k + 8].try_into().map_or(0, u64::from_le_bytes);
         let times = [time(0), time(8)];
         let channels = self.indexed(self.end + length)?;
-        Ok(channels.map(|channels| Place { offset: self.end, length, times, channels }))
+        Ok(channels.map(|channels| ChunkPlace { offset: self.end, length, times, channels }))
     }
 
     /// The numbers of the channels in the index behind a chunk.
@@ -181,7 +181,7 @@ impl ChunkFile {
     }
 
     /// Notes a chunk, and the topics that are announced in it.
-    fn take_chunk(&mut self, place: Place) -> Result {
+    fn take_chunk(&mut self, place: ChunkPlace) -> Result {
         let new = place.channels.iter().any(|channel| !self.topics.contains_key(channel));
         if (new || self.chunks.is_empty())
             && let Some(bytes) = self.read(place.offset, place.length as usize)?

@@ -43,7 +43,7 @@ struct Label {
 }
 
 #[derive(Clone)]
-struct Shared {
+struct PageState {
     token: Arc<str>,
     document: Bytes,
     posted: SyncSender<Posted>,
@@ -67,7 +67,7 @@ impl PageHost {
         let (posted, taken) = sync_channel(WAITING);
         let token = token();
         let address = format!("http://{own}/{token}/");
-        let shared = Shared { token: token.into(), document: document.into(), posted };
+        let shared = PageState { token: token.into(), document: document.into(), posted };
         runtime.spawn(async move {
             let served = match tokio::net::TcpListener::from_std(listener) {
                 Ok(listener) => axum::serve(listener, routes(shared)).await,
@@ -86,7 +86,7 @@ impl PageHost {
     }
 }
 
-fn routes(shared: Shared) -> Router {
+fn routes(shared: PageState) -> Router {
     Router::new()
         .route("/{token}/", get(document))
         .route("/{token}/{name}", get(module))
@@ -95,14 +95,14 @@ fn routes(shared: Shared) -> Router {
         .with_state(shared)
 }
 
-async fn document(State(shared): State<Shared>, Path(token): Path<String>) -> Response {
+async fn document(State(shared): State<PageState>, Path(token): Path<String>) -> Response {
     match *token == *shared.token {
         true => ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], shared.document).into_response(),
         false => StatusCode::FORBIDDEN.into_response(),
     }
 }
 
-async fn module(State(shared): State<Shared>, Path((token, name)): Path<(String, String)>) -> Response {
+async fn module(State(shared): State<PageState>, Path((token, name)): Path<(String, String)>) -> Response {
     match ASSETS.iter().find(|asset| asset.path == name) {
         _ if *token != *shared.token => StatusCode::FORBIDDEN.into_response(),
         Some(asset) => ([(header::CONTENT_TYPE, asset.media_type)], asset.bytes).into_response(),
@@ -111,7 +111,7 @@ async fn module(State(shared): State<Shared>, Path((token, name)): Path<(String,
 }
 
 async fn take(
-    State(shared): State<Shared>,
+    State(shared): State<PageState>,
     Path((token, kind)): Path<(String, String)>,
     Query(label): Query<Label>,
     body: Bytes,

@@ -75,7 +75,7 @@ impl Node {
 impl Node {
     /// A bit for each box that a line meets before `far`, and where it enters them.
     #[inline(always)]
-    fn met(&self, way: &Way, far: f32) -> (u32, [f32; WIDTH]) {
+    fn met(&self, way: &TreeRay, far: f32) -> (u32, [f32; WIDTH]) {
         let (mut met, mut near) = (0, [0.0; WIDTH]);
         for half in 0..HALVES {
             let (mut enter, mut leave) = (Vec4::ZERO, Vec4::splat(far));
@@ -101,14 +101,14 @@ impl Node {
 }
 
 /// A line in single precision, from where it enters the whole.
-struct Way {
+struct TreeRay {
     origin: [Vec4; 3],
     inverse: [Vec4; 3],
     /// 1 where it runs backwards.
     back: [usize; 3],
 }
 
-impl Way {
+impl TreeRay {
     #[inline(always)]
     fn new(entry: [f64; 3], centre: [f64; 3], inverse: [f64; 3]) -> Self {
         let splat = |x: f64| Vec4::splat(x as f32);
@@ -253,7 +253,7 @@ impl Tree {
         let inside = self.bounds.clip(line.origin, inverse);
         let Some([start, end]) = inside.filter(|[start, _]| *start <= best) else { return };
         best = best.min(end);
-        let way = Way::new(line.at(start), self.centre, inverse);
+        let way = TreeRay::new(line.at(start), self.centre, inverse);
         let farthest = |best: f64| ((best - start) as f32).next_up();
         let mut far = farthest(best);
         if stack.0.len() < (WIDTH - 1) * self.depth {

@@ -77,7 +77,7 @@ impl Detector {
 
     /// Stems of several turns that were made from different stations.
     pub fn detect_all(&self, scans: &[(&Scan, Station)]) -> Detection {
-        let mut seen = Seen::default();
+        let mut seen = TurnCounts::default();
         for (scan, station) in scans {
             self.add(scan, station, &mut seen);
         }
@@ -96,7 +96,7 @@ impl Detector {
     }
 
     /// Arcs of one turn, brought into the frame of the map.
-    fn add(&self, scan: &Scan, station: &Station, seen: &mut Seen) {
+    fn add(&self, scan: &Scan, station: &Station, seen: &mut TurnCounts) {
         if scan.points.is_empty() {
             seen.nothing = Some(Nothing::NoPoints);
             return;
@@ -141,14 +141,14 @@ impl Station {
 
 /// Collected over turns.
 #[derive(Default)]
-struct Seen {
+struct TurnCounts {
     arcs: Vec<Arc>,
     turns: Vec<Revolution>,
     dropped: Dropped,
     nothing: Option<Nothing>,
 }
 
-impl Seen {
+impl TurnCounts {
     fn add_dropped(&mut self, more: &Dropped) {
         self.dropped.not_finite += more.not_finite;
         self.dropped.out_of_range += more.out_of_range;

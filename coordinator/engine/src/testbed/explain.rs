@@ -39,7 +39,7 @@ pub struct ConnectionNote {
 impl Testbed {
     /// Explains the exchange of a run.
     pub fn explain(&self) -> Explanation {
-        let sight = Sight {
+        let sight = Explained {
             instances: self.instances(),
             links: &self.signals.links,
             schedules: &self.subsystems.schedules,
@@ -56,7 +56,7 @@ impl Testbed {
 }
 
 /// Data of an explanation.
-struct Sight<'a> {
+struct Explained<'a> {
     instances: &'a [Instance],
     links: &'a Links,
     schedules: &'a [StepSchedule],
@@ -64,7 +64,7 @@ struct Sight<'a> {
     order: &'a StepOrder,
 }
 
-impl Sight<'_> {
+impl Explained<'_> {
     fn ends(&self) -> Vec<ConnectionEnds> {
         let numbers = self.links.numbers.iter().flat_map(|link| {
             let passes = match () {

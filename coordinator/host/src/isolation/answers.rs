@@ -10,7 +10,7 @@ const SINGLES: usize = 1 << 13;
 const ROWS: usize = 1 << 7;
 
 /// Arguments of a law: one or two numbers of each node, or one of all and one of each.
-pub struct Question<'a> {
+pub struct LawQuestion<'a> {
     /// Which function.
     pub function: Call,
     /// Length of the step, s.
@@ -19,7 +19,7 @@ pub struct Question<'a> {
     pub given: [&'a [f64]; 2],
 }
 
-impl Question<'_> {
+impl LawQuestion<'_> {
     fn nodes(&self) -> usize {
         self.given[1].len()
     }
@@ -52,7 +52,7 @@ impl<const Q: usize, const A: usize> Table<Q, A> {
     }
 
     /// Writes what is known into `out`, array after array; the number behind them. None: not known.
-    fn recall(&mut self, question: &Question, out: &mut [&mut [f64]]) -> Option<f64> {
+    fn recall(&mut self, question: &LawQuestion, out: &mut [&mut [f64]]) -> Option<f64> {
         let asked = question.words();
         let (kept, answer) = self.place(&asked);
         if *kept != asked {
@@ -63,7 +63,7 @@ impl<const Q: usize, const A: usize> Table<Q, A> {
         answer.next().copied()
     }
 
-    fn keep(&mut self, question: &Question, out: &[&[f64]], last: f64) {
+    fn keep(&mut self, question: &LawQuestion, out: &[&[f64]], last: f64) {
         let asked = question.words();
         let place = self.place(&asked);
         place.0 = asked;
@@ -85,7 +85,7 @@ impl Answers {
     }
 
     /// Writes what is known into `out`; the longest step, s. None: it was not asked this, or not lately.
-    pub fn recall(&mut self, question: &Question, out: &mut [&mut [f64]]) -> Option<f64> {
+    pub fn recall(&mut self, question: &LawQuestion, out: &mut [&mut [f64]]) -> Option<f64> {
         match question.nodes() {
             1 => self.singles.recall(question, out),
             2..=NODES => self.rows.recall(question, out),
@@ -94,7 +94,7 @@ impl Answers {
     }
 
     /// Keeps an answer and the longest step, s.
-    pub fn keep(&mut self, question: &Question, out: &[&[f64]], longest: f64) {
+    pub fn keep(&mut self, question: &LawQuestion, out: &[&[f64]], longest: f64) {
         match question.nodes() {
             1 => self.singles.keep(question, out, longest),
             2..=NODES => self.rows.keep(question, out, longest),
@@ -113,22 +113,23 @@ mod tests {
         let depth: Vec<f64> = (0..NODES).map(|k| 0.01 * k as f64).collect();
         for n in [1, 2, NODES] {
             let b = [0.05];
-            let asked = |h: f64, n: usize| Question { function: Call::Pressure, h, given: [&b, &depth[..n]] };
+            let asked =
+                |h: f64, n: usize| LawQuestion { function: Call::Pressure, h, given: [&b, &depth[..n]] };
             let (p, slope) = (vec![2.0; n], vec![3.0; n]);
             let (mut p_out, mut slope_out) = (vec![0.0; n], vec![0.0; n]);
-            let mut recall = |question: &Question, answers: &mut Answers| {
+            let mut recall = |question: &LawQuestion, answers: &mut Answers| {
                 answers.recall(question, &mut [&mut p_out, &mut slope_out])
             };
             assert_eq!(recall(&asked(1e-3, n), &mut answers), None);
             answers.keep(&asked(1e-3, n), &[&p, &slope], 7.0);
             assert_eq!(recall(&asked(1e-3, n), &mut answers), Some(7.0));
             assert_eq!(recall(&asked(2e-3, n), &mut answers), None);
-            let other = Question { function: Call::Shear, ..asked(1e-3, n) };
+            let other = LawQuestion { function: Call::Shear, ..asked(1e-3, n) };
             assert_eq!(recall(&other, &mut answers), None);
             assert_eq!((p_out, slope_out), (p, slope));
         }
         let many = vec![0.0; NODES + 1];
-        let too_many = Question { function: Call::Shear, h: 1e-3, given: [&many, &many] };
+        let too_many = LawQuestion { function: Call::Shear, h: 1e-3, given: [&many, &many] };
         answers.keep(&too_many, &[&many, &many, &many], 1.0);
         assert_eq!(answers.recall(&too_many, &mut []), None);
     }

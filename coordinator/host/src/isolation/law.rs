@@ -2,7 +2,7 @@
 //!
 //! Answers are kept: a law without state is a function.
 
-use super::answers::{Answers, Question};
+use super::answers::{Answers, LawQuestion};
 use super::calls::Call;
 use super::{Link, Start, What};
 use std::any::Any;
@@ -99,7 +99,7 @@ impl NodeLaw for IsolatedLaw {
     fn pressure(&self, nodes: &PressureNodes, out: &mut PressureAnswer) -> Result {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
         let b = [nodes.b];
-        let question = Question { function: Call::Pressure, h: nodes.h, given: [&b, nodes.depth] };
+        let question = LawQuestion { function: Call::Pressure, h: nodes.h, given: [&b, nodes.depth] };
         if self.doubles == 0
             && let Some(longest) = asked.answers.recall(&question, &mut [&mut *out.pressure, &mut *out.slope])
         {
@@ -130,7 +130,7 @@ impl NodeLaw for IsolatedLaw {
 
     fn shear(&self, nodes: &ShearNodes, out: &mut ShearAnswer) -> Result {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
-        let question = Question { function: Call::Shear, h: nodes.h, given: [nodes.pressure, nodes.slip] };
+        let question = LawQuestion { function: Call::Shear, h: nodes.h, given: [nodes.pressure, nodes.slip] };
         let arrays = &mut [&mut *out.stress, &mut *out.by_pressure, &mut *out.by_slip];
         if self.doubles == 0
             && let Some(longest) = asked.answers.recall(&question, arrays)

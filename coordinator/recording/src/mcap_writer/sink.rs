@@ -39,12 +39,12 @@ enum Job {
 /// A file of chunks.
 pub(super) struct Sink {
     path: PathBuf,
-    place: Place,
+    place: EncoderPlace,
     progress: Arc<Mutex<Progress>>,
 }
 
 /// Where the encoder is.
-enum Place {
+enum EncoderPlace {
     Here(Box<Encoder>),
     Behind(Queue),
     /// Closed, or gone after an error.
@@ -70,20 +70,22 @@ struct Progress {
 impl Sink {
     /// Over an encoder that has written nothing that is kept.
     pub fn new(path: &Path, encoder: Encoder) -> Self {
-        Self { path: path.to_owned(), place: Place::Here(Box::new(encoder)), progress: Arc::default() }
+        Self { path: path.to_owned(), place: EncoderPlace::Here(Box::new(encoder)), progress: Arc::default() }
     }
 
     /// The encoder before [`Sink::start`], for what another process has written; none later.
     pub fn encoder(&mut self) -> Option<&mut Encoder> {
         match &mut self.place {
-            Place::Here(encoder) => Some(encoder),
+            EncoderPlace::Here(encoder) => Some(encoder),
             _ => None,
         }
     }
 
     /// From now on messages are written by a thread of their own; where none can be made, as before.
     pub fn start(&mut self) {
-        let Place::Here(encoder) = std::mem::replace(&mut self.place, Place::Gone) else { return };
+        let EncoderPlace::Here(encoder) = std::mem::replace(&mut self.place, EncoderPlace::Gone) else {
+            return;
+        };
         let (jobs, todo) = sync_channel(WAITING);
         let (done, spent) = channel();
         let (path, progress) = (self.path.clone(), Arc::clone(&self.progress));
@@ -97,11 +99,11 @@ impl Sink {
             Ok(thread) => {
                 // it takes the encoder before it can end
                 give.send(encoder).ok();
-                Place::Behind(Queue { jobs, spent, thread, flushed: None })
+                EncoderPlace::Behind(Queue { jobs, spent, thread, flushed: None })
             }
             Err(e) => {
                 log::warn!("{}: written by the thread of the run: {e}", self.path.display());
-                Place::Here(encoder)
+                EncoderPlace::Here(encoder)
             }
         };
     }
@@ -109,26 +111,26 @@ impl Sink {
     /// Writes a message; what `message` holds afterwards does not matter.
     pub fn write(&mut self, header: &MessageHeader, message: &mut Vec<u8>) -> McapResult<()> {
         match &mut self.place {
-            Place::Here(encoder) => encoder.write_to_known_channel(header, message),
-            Place::Behind(queue) => {
+            EncoderPlace::Here(encoder) => encoder.write_to_known_channel(header, message),
+            EncoderPlace::Behind(queue) => {
                 let empty = queue.spent.try_recv().unwrap_or_default();
                 let job = Job::Message(*header, std::mem::replace(message, empty));
                 self.ask(job)
             }
-            Place::Gone => Ok(()),
+            EncoderPlace::Gone => Ok(()),
         }
     }
 
     /// Announces a topic; the number of its channel.
     pub fn topic(&mut self, topic: Topic) -> McapResult<u16> {
         match &mut self.place {
-            Place::Here(encoder) => announce(encoder, &topic),
-            Place::Behind(_) => {
+            EncoderPlace::Here(encoder) => announce(encoder, &topic),
+            EncoderPlace::Behind(_) => {
                 let (done, answer) = sync_channel(1);
                 self.ask(Job::Topic(topic, done))?;
                 self.answered(&answer)
             }
-            Place::Gone => Ok(0),
+            EncoderPlace::Gone => Ok(0),
         }
     }
 
@@ -136,20 +138,20 @@ impl Sink {
     /// with the chunk before when this returns.
     pub fn flush(&mut self, t_s: f64) -> McapResult<()> {
         match &mut self.place {
-            Place::Here(encoder) => flush(encoder, &self.path, t_s, &self.progress),
-            Place::Behind(queue) => {
+            EncoderPlace::Here(encoder) => flush(encoder, &self.path, t_s, &self.progress),
+            EncoderPlace::Behind(queue) => {
                 let (done, answer) = sync_channel(1);
                 let before = queue.flushed.replace(answer);
                 self.ask(Job::Flush(t_s, done))?;
                 before.map_or(Ok(()), |answer| self.answered(&answer))
             }
-            Place::Gone => Ok(()),
+            EncoderPlace::Gone => Ok(()),
         }
     }
 
     /// Returns when all that was asked for is done.
     pub fn wait(&mut self) -> McapResult<()> {
-        if !matches!(self.place, Place::Behind(_)) {
+        if !matches!(self.place, EncoderPlace::Behind(_)) {
             return Ok(());
         }
         let (done, answer) = sync_channel(1);
@@ -189,19 +191,19 @@ impl Sink {
     }
 
     fn take(&mut self) -> Option<Box<Encoder>> {
-        match std::mem::replace(&mut self.place, Place::Gone) {
-            Place::Here(encoder) => Some(encoder),
-            Place::Behind(Queue { jobs, thread, .. }) => {
+        match std::mem::replace(&mut self.place, EncoderPlace::Gone) {
+            EncoderPlace::Here(encoder) => Some(encoder),
+            EncoderPlace::Behind(Queue { jobs, thread, .. }) => {
                 drop(jobs);
                 thread.join().ok().flatten()
             }
-            Place::Gone => None,
+            EncoderPlace::Gone => None,
         }
     }
 
     fn ask(&mut self, job: Job) -> McapResult<()> {
         match &self.place {
-            Place::Behind(queue) if queue.jobs.send(job).is_err() => Err(self.ended()),
+            EncoderPlace::Behind(queue) if queue.jobs.send(job).is_err() => Err(self.ended()),
             _ => Ok(()),
         }
     }

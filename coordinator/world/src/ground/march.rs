@@ -32,7 +32,7 @@ struct Block {
 pub(crate) struct Path(Vec<Block>);
 
 /// A ray in cells, cells and m, from where it enters the ground.
-struct Way {
+struct GroundRay {
     line: Line,
     sheared: Sheared,
     inverse: [Vec4; 3],
@@ -41,7 +41,7 @@ struct Way {
     start: [Vec4; 2],
 }
 
-impl Way {
+impl GroundRay {
     #[inline(always)]
     fn new(line: Line, inverse: [f64; 3], [low, high]: [f32; 2]) -> Self {
         let start = line.origin[2] as f32;
@@ -115,7 +115,7 @@ impl Ground {
         if start > best {
             return None;
         }
-        let way = Way::new(Line { origin: scaled.at(start), ..scaled }, inverse, [low, high]);
+        let way = GroundRay::new(Line { origin: scaled.at(start), ..scaled }, inverse, [low, high]);
         let found = self.descend(&way, [end - start, best - start], path)?;
         // from cells to m
         let [x, y, z] = found.normal;
@@ -124,7 +124,7 @@ impl Ground {
 
     /// The first triangle between the ray's start and `end`, before `best`.
     #[inline(always)]
-    fn descend(&self, way: &Way, [end, best]: [f64; 2], path: &mut Path) -> Option<Found> {
+    fn descend(&self, way: &GroundRay, [end, best]: [f64; 2], path: &mut Path) -> Option<Found> {
         let (mut best, mut found) = (best, None);
         let limit = |best: f64| (best.min(end) as f32 * (1.0 + ROUNDING)).next_up() + ROUNDING;
         let mut far = limit(best);
@@ -174,7 +174,7 @@ impl Ground {
 
     /// Intersection of the ray with a block that is not divided further, if it is one: a cell, or a level tile.
     #[inline(always)]
-    fn leaf(&self, way: &Way, block: &Block, best: f64) -> Option<Option<Found>> {
+    fn leaf(&self, way: &GroundRay, block: &Block, best: f64) -> Option<Option<Found>> {
         if block.level == 0 {
             return Some(self.in_cell(way, block.at, best));
         }
@@ -191,7 +191,7 @@ impl Ground {
     }
 
     #[inline(always)]
-    fn in_cell(&self, way: &Way, at: [u32; 2], best: f64) -> Option<Found> {
+    fn in_cell(&self, way: &GroundRay, at: [u32; 2], best: f64) -> Option<Found> {
         let [p, q, r, s] = corners(at, &self.cell(at));
         let [a, b] = way.sheared.cast_pair([p, q, r, s]);
         let t = if b < a { b } else { a };

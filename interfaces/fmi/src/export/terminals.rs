@@ -50,11 +50,11 @@ pub struct JointTerminal {
 }
 
 /// A terminal: name, kind, members with their variables.
-type Terminal = (String, &'static str, Vec<(&'static str, String)>);
+type ExportedTerminal = (String, &'static str, Vec<(&'static str, String)>);
 
 /// All terminals; their names differ. The name of one has no dots: those would be terminals inside it.
-fn all(layout: &Layout, joints: &[JointTerminal]) -> Vec<Terminal> {
-    let mut all: Vec<Terminal> = Vec::new();
+fn all(layout: &Layout, joints: &[JointTerminal]) -> Vec<ExportedTerminal> {
+    let mut all: Vec<ExportedTerminal> = Vec::new();
     for (prefix, kind, members) in groups(layout) {
         let members = members.into_iter().map(|m| (m, format!("{prefix}.{m}"))).collect();
         all.push((prefix.replace('.', "_"), kind, members));

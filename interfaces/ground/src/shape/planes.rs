@@ -11,15 +11,15 @@ const LANES: usize = 4;
 /// The faces by the side they look to; world axes, relative to the origin of the mesh.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Planes {
-    down: Heights,
-    up: Heights,
+    down: PlaneLanes,
+    up: PlaneLanes,
     /// n·(x, y) ≤ offset inside: x and y of the normal, offset.
     walls: Vec<[f64; 3]>,
 }
 
 /// Planes z = a·x + b·y + c, whole lanes of them.
 #[derive(Clone, Debug, Default)]
-struct Heights {
+struct PlaneLanes {
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
@@ -30,7 +30,7 @@ impl Planes {
     pub fn reserved(faces: &[Face]) -> Self {
         let heights = || {
             let lane = || Vec::with_capacity(faces.len() + LANES);
-            Heights { a: lane(), b: lane(), c: lane() }
+            PlaneLanes { a: lane(), b: lane(), c: lane() }
         };
         Self { down: heights(), up: heights(), walls: Vec::with_capacity(faces.len()) }
     }
@@ -76,7 +76,7 @@ impl Planes {
     }
 }
 
-impl Heights {
+impl PlaneLanes {
     fn clear(&mut self) {
         [&mut self.a, &mut self.b, &mut self.c].into_iter().for_each(Vec::clear);
     }

@@ -20,12 +20,12 @@ use terraglue_subsystem::{
 pub(super) struct Known {
     revision: Option<u64>,
     names: Vec<String>,
-    subsystems: Vec<Others>,
+    subsystems: Vec<CopiedOthers>,
 }
 
 /// Another subsystem, copied on demand.
 #[derive(Default)]
-struct Others {
+struct CopiedOthers {
     scene: OnceCell<Option<Scene>>,
     fields: OnceCell<Vec<FieldInfo>>,
 }
@@ -42,7 +42,7 @@ impl Known {
         // SAFETY: by the contract.
         let names = names.iter().map(|name| unsafe { borrowed(*name) }.map(str::to_owned));
         let names: Vec<String> = names.collect::<Result<_>>()?;
-        let subsystems = names.iter().map(|_| Others::default()).collect();
+        let subsystems = names.iter().map(|_| CopiedOthers::default()).collect();
         *self = Self { revision: Some(raw.revision), names, subsystems };
         Ok(())
     }

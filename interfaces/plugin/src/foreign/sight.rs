@@ -27,12 +27,12 @@ struct Copies {
     revision: Option<u64>,
     _names: Vec<CString>,
     pointers: Vec<*const c_char>,
-    subsystems: Vec<Others>,
+    subsystems: Vec<ForeignOthers>,
 }
 
 /// Another subsystem, made on demand.
 #[derive(Default)]
-struct Others {
+struct ForeignOthers {
     scene: OnceCell<Option<SceneTable>>,
     fields: OnceCell<(Vec<TgField>, Keep)>,
 }
@@ -112,7 +112,7 @@ impl Copies {
         Self {
             revision: Some(world.revision()),
             pointers: names.iter().map(|name| name.as_ptr()).collect(),
-            subsystems: names.iter().map(|_| Others::default()).collect(),
+            subsystems: names.iter().map(|_| ForeignOthers::default()).collect(),
             _names: names,
         }
     }

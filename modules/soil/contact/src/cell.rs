@@ -42,7 +42,7 @@ impl Plane {
 }
 
 /// Underside at a neighbour.
-struct Side {
+struct Neighbour {
     /// Its plane as seen from the node.
     plane: Plane,
     /// Weight of the slopes of both.
@@ -138,7 +138,7 @@ impl PatchNodes {
         let seen = |steps: [i32; 2]| {
             let next = rows.beside(at, steps)?;
             let (plane, weight) = (self.plane[next].seen(steps, spacing), weight * rows.weight(next));
-            Some(Side { plane, weight, edge: over_border(&own, &plane, weight, spacing) })
+            Some(Neighbour { plane, weight, edge: over_border(&own, &plane, weight, spacing) })
         };
         // written out, since `map` copies
         let mut beside = [const { None }; 4];
@@ -148,7 +148,7 @@ impl PatchNodes {
         // change of slope number `of` along an axis where the underside bends, on both sides of the node alike
         let bend = |of: usize, axis: usize| {
             let side = |number: usize, sign: f64| {
-                let Side { plane, weight, edge } = beside[2 * axis + number].as_ref()?;
+                let Neighbour { plane, weight, edge } = beside[2 * axis + number].as_ref()?;
                 let bend = weight * (plane.slope[of] - own.slope[of]);
                 Some((sign * bend / spacing, edge.is_some()))
             };

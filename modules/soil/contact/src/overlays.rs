@@ -17,7 +17,7 @@ const WIDTH_M: f64 = 0.002;
 const LINES: u32 = 8;
 
 /// A node with pressure.
-struct Pressed {
+struct DrawnNode {
     /// On the surface that the soil springs back to without the contact, m.
     at: [f64; 3],
     /// Height of the ground before the contact, m.
@@ -39,7 +39,7 @@ pub(crate) fn of(
     let (mut pressure, mut cones) = (Vec::new(), Vec::new());
     while let Some(first) = left.pop_first() {
         let members = connected(first, &mut left);
-        let nodes: Vec<Pressed> = members.iter().map(|ij| pressed(ground, lattice, *ij)).collect();
+        let nodes: Vec<DrawnNode> = members.iter().map(|ij| pressed(ground, lattice, *ij)).collect();
         let tips = members.iter().zip(&nodes).flat_map(|([i, j], node)| {
             let [x, y, z] = node.at;
             [node.at, [x, y, z + METRES_PER_PASCAL * ground.nodes.get(*i, *j).pressure]]
@@ -70,10 +70,10 @@ fn connected(first: [i32; 2], left: &mut BTreeSet<[i32; 2]>) -> Vec<[i32; 2]> {
     members
 }
 
-fn pressed(ground: &Ground, lattice: &Lattice, [i, j]: [i32; 2]) -> Pressed {
+fn pressed(ground: &Ground, lattice: &Lattice, [i, j]: [i32; 2]) -> DrawnNode {
     let state = ground.nodes.get(i, j);
     let place = |axis: usize, k: i32| lattice.origin[axis] + f64::from(k) * lattice.spacing;
-    Pressed {
+    DrawnNode {
         at: [place(0, i), place(1, j), state.reference - state.permanent],
         reference: state.reference,
         force: state.pressure * state.area,
@@ -81,7 +81,7 @@ fn pressed(ground: &Ground, lattice: &Lattice, [i, j]: [i32; 2]) -> Pressed {
 }
 
 /// Lines of the cone |T_t| ≤ tan φ · T_n with its apex where the force acts, as high as the normal force; pairs of points.
-fn cone(nodes: &[Pressed], friction: f64) -> Vec<[f64; 3]> {
+fn cone(nodes: &[DrawnNode], friction: f64) -> Vec<[f64; 3]> {
     let force: f64 = nodes.iter().map(|n| n.force).sum();
     let apex = [0, 1, 2].map(|k| nodes.iter().map(|n| n.at[k] * n.force).sum::<f64>() / force);
     let n = normal(nodes);
@@ -103,12 +103,13 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
 }
 
 /// Of the plane z = a + b·x + c·y through the reference levels by least squares; up where they do not span one.
-fn normal(nodes: &[Pressed]) -> [f64; 3] {
+fn normal(nodes: &[DrawnNode]) -> [f64; 3] {
     let count = nodes.len() as f64;
-    let mean = |f: &dyn Fn(&Pressed) -> f64| nodes.iter().map(f).sum::<f64>() / count;
+    let mean = |f: &dyn Fn(&DrawnNode) -> f64| nodes.iter().map(f).sum::<f64>() / count;
     let centre = [mean(&|n| n.at[0]), mean(&|n| n.at[1]), mean(&|n| n.reference)];
     let sum = |a: usize, b: usize| {
-        let part = |n: &Pressed, k: usize| if k < 2 { n.at[k] - centre[k] } else { n.reference - centre[2] };
+        let part =
+            |n: &DrawnNode, k: usize| if k < 2 { n.at[k] - centre[k] } else { n.reference - centre[2] };
         nodes.iter().map(|n| part(n, a) * part(n, b)).sum::<f64>()
     };
     let [xx, xy, yy, xz, yz] = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2)].map(|(a, b)| sum(a, b));

@@ -23,7 +23,7 @@ const SIZES: [f64; 5] = [1.0, 0.5, 0.1, 1.5, 3.0];
 const LONGEST: Duration = Duration::from_secs(120);
 
 /// Outcome of a run of either kind.
-enum Fate {
+enum RunOutcome {
     Equal,
     Different(String),
     /// It runs in neither.
@@ -50,14 +50,14 @@ fn counted(place: &Path, context: &Context, name: &str, runs: Vec<(PathBuf, f64)
         let fate = std::fs::create_dir_all(&own)
             .map_err(|e| e.to_string())
             .and_then(|()| fate(&own, context, fmu, *size))
-            .unwrap_or_else(Fate::Different);
+            .unwrap_or_else(RunOutcome::Different);
         drop(std::fs::remove_dir_all(&own));
         (format!("{} x {size}", folder::stem(fmu)), fate)
     };
     let fates = in_parallel(&numbered, judge);
-    let run = fates.iter().filter(|(_, fate)| !matches!(fate, Fate::Neither)).count();
-    let told = |(name, fate): &(String, Fate)| match fate {
-        Fate::Different(why) => Some(format!("{name}: {why}")),
+    let run = fates.iter().filter(|(_, fate)| !matches!(fate, RunOutcome::Neither)).count();
+    let told = |(name, fate): &(String, RunOutcome)| match fate {
+        RunOutcome::Different(why) => Some(format!("{name}: {why}")),
         _ => None,
     };
     let different: Vec<String> = fates.iter().filter_map(told).collect();
@@ -71,8 +71,8 @@ fn counted(place: &Path, context: &Context, name: &str, runs: Vec<(PathBuf, f64)
     )]
 }
 
-fn fate(place: &Path, context: &Context, fmu: &Path, size: f64) -> Outcome<Fate> {
-    let Ok((description, _)) = Fmu::inspect(fmu) else { return Ok(Fate::Neither) };
+fn fate(place: &Path, context: &Context, fmu: &Path, size: f64) -> Outcome<RunOutcome> {
+    let Ok((description, _)) = Fmu::inspect(fmu) else { return Ok(RunOutcome::Neither) };
     let fmu = fmu.canonicalize().map_err(|e| e.to_string())?;
     let step = size * description.experiment.step.filter(|h| *h > 0.0).unwrap_or(USUAL_STEP);
     let stop = f64::from(STEPS) * step;
@@ -107,10 +107,10 @@ fn fate(place: &Path, context: &Context, fmu: &Path, size: f64) -> Outcome<Fate>
         Ok(difference(&of_numbers, &last(&place.join("out/variables.csv"), "x.")?))
     };
     Ok(match [alone.code == Some(0), within.code == Some(0) || asks] {
-        [true, true] => differ()?.map_or(Fate::Equal, Fate::Different),
-        [false, false] => Fate::Neither,
-        [true, false] => Fate::Different(format!("runs alone only: {}", within.error())),
-        [false, true] => Fate::Different(format!("runs in a scenario only: {}", alone.error())),
+        [true, true] => differ()?.map_or(RunOutcome::Equal, RunOutcome::Different),
+        [false, false] => RunOutcome::Neither,
+        [true, false] => RunOutcome::Different(format!("runs alone only: {}", within.error())),
+        [false, true] => RunOutcome::Different(format!("runs in a scenario only: {}", alone.error())),
     })
 }
 

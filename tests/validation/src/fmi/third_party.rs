@@ -29,7 +29,7 @@ const ACCURACY: f64 = 1e-9;
 
 /// Outcome of an FMU.
 #[derive(Debug, PartialEq)]
-enum Fate {
+enum FmuOutcome {
     /// It is no FMU for co-simulation on this machine.
     Other,
     Equal,
@@ -45,7 +45,7 @@ enum Fate {
 
 /// Results of FMPy for an FMU.
 #[derive(Debug, Default)]
-struct Told {
+struct FmpyResult {
     /// Start, stop and step, s, and whether with event mode; none: it is no FMU for co-simulation on this machine.
     times: Option<Vec<String>>,
     /// Its last row; none: FMPy does not simulate it.
@@ -74,12 +74,12 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
         let fate = std::fs::create_dir_all(&own)
             .map_err(|e| e.to_string())
             .and_then(|()| fate(&own, (context, &python), fmu, steps))
-            .unwrap_or_else(Fate::Failed);
+            .unwrap_or_else(FmuOutcome::Failed);
         drop(std::fs::remove_dir_all(&own));
         (folder::stem(fmu), fate)
     };
     let mut fates = in_parallel(&numbered, judge);
-    fates.retain(|(_, fate)| *fate != Fate::Other);
+    fates.retain(|(_, fate)| *fate != FmuOutcome::Other);
     Ok(counted(&fates))
 }
 
@@ -104,8 +104,8 @@ fn without_copies(fmus: Vec<PathBuf>) -> Outcome<Vec<PathBuf>> {
     Ok(kept.into_iter().map(|(path, _)| path).collect())
 }
 
-fn counted(fates: &[(String, Fate)]) -> Vec<Figure> {
-    let figure = |name: &str, limit, what: &str, of: fn(&Fate) -> Option<&str>| {
+fn counted(fates: &[(String, FmuOutcome)]) -> Vec<Figure> {
+    let figure = |name: &str, limit, what: &str, of: fn(&FmuOutcome) -> Option<&str>| {
         let found: Vec<(&str, &str)> =
             fates.iter().filter_map(|(fmu, fate)| Some((fmu.as_str(), of(fate)?))).collect();
         let told: Vec<String> = found
@@ -123,42 +123,42 @@ fn counted(fates: &[(String, Fate)]) -> Vec<Figure> {
             Some("")
         }),
         figure("equal", Limit::None, "of them with the same last row here and in FMPy, to 1e-9", |f| {
-            (*f == Fate::Equal).then_some("")
+            (*f == FmuOutcome::Equal).then_some("")
         }),
         figure("only_here", Limit::None, "run here and not in FMPy", |f| {
-            (*f == Fate::OnlyHere).then_some("")
+            (*f == FmuOutcome::OnlyHere).then_some("")
         }),
         figure("neither", Limit::None, "run neither here nor in FMPy", |f| {
-            if let Fate::Neither(why) = f { Some(why) } else { None }
+            if let FmuOutcome::Neither(why) = f { Some(why) } else { None }
         }),
         figure(
             "refused",
             Limit::None,
             "FMPy simulates them, here they are refused with what breaks the standard",
             |f| {
-                if let Fate::Refused(why) = f { Some(why) } else { None }
+                if let FmuOutcome::Refused(why) = f { Some(why) } else { None }
             },
         ),
         figure("different", zero, "end with another row than in FMPy", |f| {
-            if let Fate::Different(why) = f { Some(why) } else { None }
+            if let FmuOutcome::Different(why) = f { Some(why) } else { None }
         }),
         figure(
             "failed",
             zero,
             "FMPy simulates them, here they neither run nor are refused with what breaks the standard",
             |f| {
-                if let Fate::Failed(why) = f { Some(why) } else { None }
+                if let FmuOutcome::Failed(why) = f { Some(why) } else { None }
             },
         ),
     ]
 }
 
-fn fate(place: &Path, (context, python): (&Context, &Path), fmu: &Path, steps: u32) -> Outcome<Fate> {
+fn fate(place: &Path, (context, python): (&Context, &Path), fmu: &Path, steps: u32) -> Outcome<FmuOutcome> {
     let fmu = &fmu.canonicalize().map_err(|e| format!("{}: {e}", fmu.display()))?;
     let mut script = Command::new(python);
     script.arg(root().join(SCRIPT)).arg(fmu).arg(steps.to_string());
     let told = told(&watched(&mut script, place, LONGEST)?.output);
-    let Some(times) = &told.times else { return Ok(Fate::Other) };
+    let Some(times) = &told.times else { return Ok(FmuOutcome::Other) };
     let mut own = Command::new(&context.program);
     own.args(["fmu", "run", "--isolate", "--timeout", &TIMEOUT_S.to_string()]).arg(fmu);
     own.args(
@@ -172,21 +172,21 @@ fn fate(place: &Path, (context, python): (&Context, &Path), fmu: &Path, steps: u
     let complaint = ended.error().replace(&format!("{}: ", fmu.display()), "");
     Ok(match (ended.code == Some(0), &told.row) {
         (true, Some(row)) => match difference(fmu, &table, row, times.last().is_some_and(|t| t == "on"))? {
-            None => Fate::Equal,
-            Some(why) => Fate::Different(why),
+            None => FmuOutcome::Equal,
+            Some(why) => FmuOutcome::Different(why),
         },
-        (true, None) => Fate::OnlyHere,
-        (false, None) => Fate::Neither(complaint),
+        (true, None) => FmuOutcome::OnlyHere,
+        (false, None) => FmuOutcome::Neither(complaint),
         (false, Some(row)) => match breach(fmu, &complaint, row) {
-            Some(why) => Fate::Refused(why),
-            None => Fate::Failed(complaint),
+            Some(why) => FmuOutcome::Refused(why),
+            None => FmuOutcome::Failed(complaint),
         },
     })
 }
 
-fn told(text: &str) -> Told {
+fn told(text: &str) -> FmpyResult {
     let after = |word: &str| text.lines().rev().find_map(|line| line.strip_prefix(word));
-    Told {
+    FmpyResult {
         times: after("EXPERIMENT ").map(|t| t.split(' ').map(str::to_owned).collect()),
         row: after("RESULT ").and_then(|t| serde_json::from_str(t).ok()),
     }
@@ -312,8 +312,11 @@ mod tests {
 
     #[test]
     fn fates_are_counted_and_told() {
-        let fates =
-            [("a", Fate::Equal), ("b", Fate::Refused("x is NaN".into())), ("c", Fate::Failed("lost".into()))];
+        let fates = [
+            ("a", FmuOutcome::Equal),
+            ("b", FmuOutcome::Refused("x is NaN".into())),
+            ("c", FmuOutcome::Failed("lost".into())),
+        ];
         let figures = counted(&fates.map(|(name, fate)| (name.to_owned(), fate)));
         let of = |name: &str| figures.iter().find(|f| f.id.ends_with(name)).expect("the figure").clone();
         assert_eq!(

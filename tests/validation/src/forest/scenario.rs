@@ -22,8 +22,8 @@ const RUNS: [(&str, f64, f64); 4] = [
 ];
 
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let runs = in_parallel(&RUNS, |run| Told::of(context, run, 1));
-    let runs: Vec<Told> = runs.into_iter().collect::<Outcome<_>>()?;
+    let runs = in_parallel(&RUNS, |run| RunResult::of(context, run, 1));
+    let runs: Vec<RunResult> = runs.into_iter().collect::<Outcome<_>>()?;
     let mut all = Vec::new();
     for (run, (name, quick, whole)) in runs.iter().zip(RUNS) {
         let time = if context.quick { quick } else { whole };
@@ -38,7 +38,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 }
 
 /// Results of a run.
-struct Told {
+struct RunResult {
     folder: PathBuf,
     time: Vec<f64>,
     known: Vec<f64>,
@@ -48,7 +48,7 @@ struct Told {
     real_time_factor: f64,
 }
 
-impl Told {
+impl RunResult {
     fn of(context: &Context, (name, quick, whole): &(&str, f64, f64), threads: usize) -> Outcome<Self> {
         let id = format!("{name}.{threads}");
         let folder = context.scratch.join(&id);
@@ -152,9 +152,9 @@ impl Told {
 }
 
 /// Whether two threads give the bytes of one.
-fn same_bytes(context: &Context, one: &Told) -> Outcome<Figure> {
-    let two = Told::of(context, &RUNS[0], 2)?;
-    let read = |told: &Told| std::fs::read(told.folder.join("variables.csv")).map_err(|e| e.to_string());
+fn same_bytes(context: &Context, one: &RunResult) -> Outcome<Figure> {
+    let two = RunResult::of(context, &RUNS[0], 2)?;
+    let read = |told: &RunResult| std::fs::read(told.folder.join("variables.csv")).map_err(|e| e.to_string());
     let differ = f64::from(u8::from(read(one)? != read(&two)?));
     let what = "F15 whether the variables of forest_drive differ between one thread and two";
     Ok(Figure::new("forest.forest_drive.threads", differ, Limit::Equal(0.0), what))

@@ -120,7 +120,7 @@ fn whole(setting: &Setting) -> String {
 }
 
 /// Results at the end of a run.
-struct End {
+struct SqueezerEnd {
     /// Largest error of a multiplier in parts of the largest multiplier.
     multipliers: f64,
     /// Largest error of a multiplier in parts of itself.
@@ -130,7 +130,7 @@ struct End {
     tally: Tally,
 }
 
-fn run(h: f64) -> Outcome<End> {
+fn run(h: f64) -> Outcome<SqueezerEnd> {
     let setting = Setting { gluing: String::new(), ..Setting::iterative(h, [0.0; 3]) };
     let (mut glued, mut uncut) = (build(&cut(&setting))?, build(&whole(&setting))?);
     let (mut tally, mut apart) = (Tally::default(), 0.0_f64);
@@ -142,7 +142,7 @@ fn run(h: f64) -> Outcome<End> {
     })?;
     let largest = MULTIPLIERS[0];
     let error = |k: usize| (wrench(&glued, k / 2, k % 2) - MULTIPLIERS[k]).abs();
-    Ok(End {
+    Ok(SqueezerEnd {
         multipliers: (0..6).map(|k| error(k) / largest).fold(0.0, larger),
         each: (0..6).map(|k| error(k) / MULTIPLIERS[k].abs()).fold(0.0, larger),
         beta: (read(&glued, "crank.b0.angle")? - BETA).abs(),

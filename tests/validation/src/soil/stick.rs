@@ -9,7 +9,7 @@ use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Geometry, Subsystem};
 
-type Maker = fn(fn(f64, f64) -> f64) -> Box<dyn Subsystem>;
+type SlopeMaker = fn(fn(f64, f64) -> f64) -> Box<dyn Subsystem>;
 
 const LOAD: f64 = 50.0;
 const RADIUS: f64 = 0.05;
@@ -37,7 +37,7 @@ struct Held {
 }
 
 /// The disc under `share` of its limit for `seconds`.
-fn held(make: Maker, sloped: bool, share: f64, seconds: f64) -> Held {
+fn held(make: SlopeMaker, sloped: bool, share: f64, seconds: f64) -> Held {
     let geometry = Geometry::Cylinder { half_length: 0.02, radius: RADIUS };
     let ground = if sloped { slope } else { flat as fn(f64, f64) -> f64 };
     let mut fixture = Fixture::new(make(ground), geometry, LOAD / 9.81, 0.02);
@@ -79,7 +79,7 @@ fn rig_step() -> f64 {
 /// All figures.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let seconds = if context.quick { 4.0 } else { 60.0 };
-    let soils: [(&str, Maker); 2] =
+    let soils: [(&str, SlopeMaker); 2] =
         [("automaton", on::<SoilCellularAutomaton>), ("bekker", on::<SoilBekker>)];
     let mut cases = Vec::new();
     for (module, make) in soils {

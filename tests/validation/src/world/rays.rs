@@ -13,7 +13,7 @@ use terraglue_world::Parallel;
 
 /// Counts over the rays through some worlds.
 #[derive(Clone, Copy, Default)]
-struct Tally {
+struct RayCounts {
     rays: usize,
     hits: usize,
     wrong: usize,
@@ -34,7 +34,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         .flat_map(|(bodies, worlds, rays)| (0..*worlds).map(move |seed| (seed, *bodies, *rays)))
         .collect();
     let tallies = in_parallel(&worlds, |(seed, bodies, count)| compared(*seed, *bodies, *count));
-    let mut sum = Tally::default();
+    let mut sum = RayCounts::default();
     for tally in tallies {
         let tally = tally?;
         sum.rays += tally.rays;
@@ -78,11 +78,11 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(out)
 }
 
-fn compared(seed: u64, bodies: usize, count: usize) -> Outcome<Tally> {
+fn compared(seed: u64, bodies: usize, count: usize) -> Outcome<RayCounts> {
     let (pieces, heights) = scenes(seed, bodies);
     let world = told(drawn(&pieces, &heights, &[0, 1, 2], None))?;
     let rays = rays(seed, bodies, count);
-    let mut tally = Tally { rays: count, ..Tally::default() };
+    let mut tally = RayCounts { rays: count, ..RayCounts::default() };
     for (ray, hit) in rays.iter().zip(cast(&world, &rays)) {
         let candidates = naive(&pieces, &[(0, &heights)], ray);
         let nearest = candidates.iter().map(|c| c.distance).fold(f64::INFINITY, smaller);

@@ -6,9 +6,9 @@ use crate::survey::Survey;
 use std::fmt::Write;
 use std::sync::Arc;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Causality, Config, Error, Host, Input, Kind, Message, Module, Motion, Parameter,
-    ParameterType, Response, Result, Scene, Schema, Slots, Step, StreamInfo, Subsystem, Terrain, ValueType,
-    ValuesMut, Variable, bytes, persist,
+    BodyState, Capabilities, Causality, Config, Energy, Error, Host, Input, Kind, Message, Module, Motion,
+    Parameter, ParameterType, Response, Result, Scene, Schema, Slots, Step, StreamInfo, Subsystem, Terrain,
+    ValueType, ValuesMut, Variable, bytes, persist,
 };
 
 /// Form of the serialized state.
@@ -224,6 +224,11 @@ impl Subsystem for Forest {
         Ok(())
     }
 
+    /// Trees never move and carry no load: all energies are zero, and known.
+    fn energy(&self) -> Energy {
+        Energy::default()
+    }
+
     fn save_state(&mut self, slot: u32) -> Result {
         self.slots.save(slot, self.told)
     }
@@ -272,6 +277,7 @@ mod tests {
         let forest = forest(r#"{"half_m": 20}"#).expect("a stand");
         let scene = forest.scene();
         assert_eq!((scene.bodies.len(), scene.joints.len()), (1, 1));
+        assert_eq!((forest.energy().is_known(), forest.energy().mechanical()), (true, 0.0));
         assert!(scene.shapes.len() > 7 * forest.stand().trees.len() && forest.stand().trees.len() > 50);
         assert!(scene.shapes.iter().all(|s| s.wrong().is_none()));
         let mut out = [0_u64];

@@ -9,9 +9,9 @@ use super::{Link, Start};
 use std::cell::{Cell, RefCell};
 use std::time::Instant;
 use terraglue_subsystem::{
-    Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
-    Message, Motion, Overlay, Response, Result, Scene, Step, StreamInfo, Subsystem, Terrain, Values,
-    ValuesMut, Variable, World,
+    Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FeedThrough, FieldInfo, FieldTile,
+    Input, Law, Level, Message, Motion, Overlay, Response, Result, Scene, Step, StreamInfo, Subsystem,
+    Terrain, Values, ValuesMut, Variable, World,
 };
 
 /// An instance in a worker.
@@ -32,6 +32,7 @@ pub struct ModuleInfo {
     pub scene: Scene,
     pub fields: Vec<FieldInfo>,
     pub streams: Vec<StreamInfo>,
+    pub feed_through: Vec<FeedThrough>,
     /// Whether it books energies and knows events; a functional mock-up unit does not.
     pub is_module: bool,
 }
@@ -44,6 +45,7 @@ impl ModuleInfo {
         w.put(&self.scene);
         w.put(&self.fields);
         w.put(&self.streams);
+        w.put(&self.feed_through);
         w.put(&self.is_module);
     }
 
@@ -55,6 +57,7 @@ impl ModuleInfo {
             scene: r.take()?,
             fields: r.take()?,
             streams: r.take()?,
+            feed_through: r.take()?,
             is_module: r.take()?,
         })
     }
@@ -248,6 +251,10 @@ impl Subsystem for Isolated {
         Ok(())
     }
 
+    fn feed_through(&self) -> Vec<FeedThrough> {
+        self.about.feed_through.clone()
+    }
+
     fn streams(&self) -> &[StreamInfo] {
         &self.about.streams
     }
@@ -307,6 +314,27 @@ impl Subsystem for Isolated {
                 calls::put_values(w, &values);
             },
             |_| Some(()),
+        )
+    }
+
+    fn directional_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        if self.about.is_module {
+            return Err(Error::Unsupported);
+        }
+        self.link.borrow_mut().call(
+            Call::Directional,
+            |w| {
+                w.put(unknowns);
+                w.put(knowns);
+                w.put(seed);
+            },
+            |r| r.fill(out),
         )
     }
 

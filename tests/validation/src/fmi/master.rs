@@ -185,7 +185,7 @@ fn apart(place: &Path, context: &Context) -> Outcome<[Figure; 2]> {
 }
 
 /// Descriptions that are wrong in one place each: the words of a variable, and its name.
-const DEFECTS: [(&str, &str); 11] = [
+const DEFECTS: [(&str, &str); 15] = [
     (
         "enumeration",
         "<Enumeration name=\"v\" valueReference=\"1\" causality=\"parameter\" variability=\"fixed\" start=\"1\"/>",
@@ -217,6 +217,10 @@ const DEFECTS: [(&str, &str); 11] = [
         "calculated",
         "<Float64 name=\"v\" valueReference=\"1\" causality=\"local\" initial=\"calculated\" start=\"1\"/>",
     ),
+    ("clocks", "<Float64 name=\"v\" valueReference=\"1\" causality=\"input\" start=\"0\" clocks=\"55\"/>"),
+    ("derivative", "<Float64 name=\"v\" valueReference=\"1\" causality=\"local\" derivative=\"9\"/>"),
+    ("limit", "<Int32 name=\"v\" valueReference=\"1\" causality=\"input\" start=\"0\" max=\"99999999999\"/>"),
+    ("single", "<Float32 name=\"v\" valueReference=\"1\" causality=\"input\" start=\"1e50\"/>"),
     (
         "role",
         "<Float64 name=\"v\" valueReference=\"1\" causality=\"parameter\" variability=\"continuous\" start=\"1\"/>",

@@ -32,9 +32,10 @@ pub struct ModuleInfo {
     pub scene: Scene,
     pub fields: Vec<FieldInfo>,
     pub streams: Vec<StreamInfo>,
-    pub feed_through: Vec<FeedThrough>,
     /// Whether it books energies and knows events; a functional mock-up unit does not.
     pub is_module: bool,
+    /// Of a functional mock-up unit only.
+    pub feed_through: Vec<FeedThrough>,
 }
 
 impl ModuleInfo {
@@ -45,21 +46,27 @@ impl ModuleInfo {
         w.put(&self.scene);
         w.put(&self.fields);
         w.put(&self.streams);
-        w.put(&self.feed_through);
         w.put(&self.is_module);
+        if !self.is_module {
+            w.put(&self.feed_through);
+        }
     }
 
     fn take(r: &mut Reader) -> Option<Self> {
-        Some(Self {
+        let mut all = Self {
             capabilities: Capabilities(r.take()?),
             variables: r.take()?,
             actions: r.take()?,
             scene: r.take()?,
             fields: r.take()?,
             streams: r.take()?,
-            feed_through: r.take()?,
             is_module: r.take()?,
-        })
+            feed_through: Vec::new(),
+        };
+        if !all.is_module {
+            all.feed_through = r.take()?;
+        }
+        Some(all)
     }
 }
 

@@ -32,11 +32,15 @@ int fmi2DoStep(Fmu *u, double t, double h, int p) { double *r = u->r; int *i = u
 """
 
 
-def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags="", depends=None):
+def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags="", depends=None, instead=()):
     """The FMU `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
-    of its own, `flags` attributes of <CoSimulation>; `depends` the places of the variables that the outputs depend on, from 1; none: all of them."""
+    of its own, `flags` attributes of <CoSimulation>; `depends` the places of the variables that the outputs depend on, from 1, of all outputs or
+    of each by name; none: all of them; `instead`: functions of the frame that `more` replaces."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
-    (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step, "more": more})
+    frame = FRAME
+    for own in instead:
+        frame = frame.replace(f"int {own}(", f"static int frame_{own}(")
+    (folder / f"{name}.c").write_text(frame % {"start": starts, "step": step, "more": more})
     command = ["cc", "-shared", "-fPIC", "-w", f"{name}.c", "-o", f"{name}.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     text = ""
@@ -46,8 +50,9 @@ def build(folder, name, reals, step, others="", units="", variable_step=True, ty
         unit = f' unit="{unit}"' if unit else ""
         text += f'<ScalarVariable name="{own}" valueReference="{k}" causality="{causality}"{tunable}>'
         text += f"<Real{value}{unit}/></ScalarVariable>"
-    known = "" if depends is None else f' dependencies="{depends}"'
-    outputs = "".join(f'<Unknown index="{k + 1}"{known}/>' for k, v in enumerate(reals) if v[1] == "output")
+    of = lambda name: depends.get(name) if isinstance(depends, dict) else depends
+    known = lambda name: "" if of(name) is None else f' dependencies="{of(name)}"'
+    outputs = "".join(f'<Unknown index="{k + 1}"{known(v[0])}/>' for k, v in enumerate(reals) if v[1] == "output")
     units = f"<UnitDefinitions>{units}</UnitDefinitions>" if units else ""
     types = f"<TypeDefinitions>{types}</TypeDefinitions>" if types else ""
     variable = str(variable_step).lower()

@@ -174,6 +174,15 @@ def test_a_step_counts_as_made_where_the_fmu_does_not_say_how_far_it_came(tmp_pa
         assert done.stderr.count("does not say how far it came (lastSuccessfulTime)") == 1, done.stderr
 
 
+def test_an_early_return_that_is_not_allowed_is_told_once(tmp_path):
+    step = "if (h > 0.2) { v[1][0] += 0.1; *early = true; *last = t + 0.1; return 0; } v[1][0] += h;"
+    fmu = cfmu.build_3(tmp_path, "early", [("x", "output", "", ())], step)
+    alone, inside, last, end = both_ways(fmu, tmp_path)
+    assert (alone.returncode, inside.returncode) == (0, 0), alone.stderr + inside.stderr
+    assert end == pytest.approx(1.0, abs=1e-12) and float(last.split(",")[1]) == pytest.approx(1.0, abs=1e-12)
+    assert alone.stderr.count("which was not allowed (earlyReturnAllowed = false)") == 1, alone.stderr
+
+
 def test_an_fmu_that_saves_nothing_runs_without_its_state(tmp_path):
     fmu = cfmu.build_3(tmp_path, "forgetful", [("x", "output", "", ())], "v[1][0] += h;", macros=["SAVES_NOTHING"])
     alone, inside, last, _ = both_ways(fmu, tmp_path)

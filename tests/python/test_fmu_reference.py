@@ -5,7 +5,7 @@ import io
 import zipfile
 
 import pytest
-from cfmu import build
+from cfmu import build, build_3
 from conftest import terraglue
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -69,6 +69,32 @@ def test_results_that_cannot_be_read_are_named(fmu, results, source, words):
     bring(fmu, results, source=source)
     code, text = check(fmu)
     assert code in (1, 2) and all(word in text for word in words) and "panic" not in text, text
+
+
+def test_a_column_of_another_version_is_not_compared(fmu):
+    # the Modelica Reference FMUs bring one file for both versions of FMI
+    bring(fmu, "time,Float32_x,x\n0,7,1\n1,7,1\n")
+    code, text = check(fmu)
+    assert code == 0 and "not compared" in text and "Float32_x" in text and "| x " in text, text
+
+
+def test_arrays_in_one_cell_and_truth_values_are_compared(tmp_path):
+    flag = '<Boolean name="on" valueReference="3" causality="output"/>'
+    more = "int fmi3GetBoolean(Fmu *u, const unsigned *r, size_t k, bool *x, size_t m) { *x = u->v[1][0] > 0.5; return 0; }"
+    reals = [("y", "output", None, [3]), ("x", "output", None, [])]
+    step = "for (int i = 0; i < 3; i++) v[1][i] = (i + 1) * (t + h); v[2][0] = t;"
+    for rows, off in (("0,0 0 0,false\n1,1 2 3,true\n", []), ("0,0 0 0,false\n1,1 2 4,false\n", ["on", "y[3]"])):
+        one = build_3(tmp_path, "array", reals, step, others=flag, more=more)
+        with zipfile.ZipFile(one) as archive:
+            entries = {i.filename: archive.read(i) for i in archive.infolist()}
+        entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(b"<ModelStructure>", b'<ModelStructure><Output valueReference="3"/>')
+        with zipfile.ZipFile(one, "w") as archive:
+            [archive.writestr(name, data) for name, data in entries.items()]
+        bring(one, "time,y,on\n" + rows)
+        code, text = check(one)
+        lines = [line for line in text.splitlines() if line.startswith("| ") and line.rstrip().endswith("off |")]
+        assert code == (1 if off else 0), text
+        assert sorted(line.split("|")[1].strip() for line in lines) == off and "| y[2] " in text, text
 
 
 def test_without_results_it_says_so(fmu):

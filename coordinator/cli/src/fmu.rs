@@ -192,6 +192,9 @@ fn check(fmu: &Path, within: Option<f64>) -> Result<Exit> {
     let mut off = false;
     for run in &runs {
         outln!("{}: {} rows", run.file, run.rows);
+        if !run.foreign.is_empty() {
+            outln!("not compared, as the FMU has no such variable: {}", run.foreign.join(", "));
+        }
         outln!("{}", deviations(run, within));
         off |= run.deviations.iter().any(|d| !(d.share <= within));
     }

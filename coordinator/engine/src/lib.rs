@@ -8,6 +8,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod graph;
 pub mod observer;
 pub mod signals;
 pub mod testbed;

@@ -23,6 +23,7 @@ mod explain;
 mod glued;
 mod group;
 mod hosted;
+mod loop_values;
 mod loops;
 mod newton;
 mod pieces;
@@ -258,6 +259,7 @@ impl Testbed {
         let early =
             self.uncoupled.advance(&self.clock, (h, end), &mut self.signals.links, &mut self.subsystems)?;
         if let Some(why) = early {
+            self.glued.failed = None;
             return Ok(Outcome::NotConverged(why));
         }
         self.timings.charge_sample(Part::Uncoupled, start, times);

@@ -18,8 +18,8 @@ use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, FmuState, Step
 use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Error, Host, Input, Law, Level, LogLevel, Motion, Response, Result, Scene, Step,
-    Subsystem, ValueType, Values, ValuesMut, Variable,
+    BodyState, Capabilities, Error, FeedThrough, Host, Input, Law, Level, LogLevel, Motion, Response, Result,
+    Scene, Step, Subsystem, ValueType, Values, ValuesMut, Variable,
 };
 
 /// An instance of an FMU as a subsystem. Fields that every step reads come first and in this order, on two lines of the
@@ -52,8 +52,6 @@ pub struct FmuSubsystem {
     /// Arrays by reference that are being set element by element before the initialisation.
     starts: BTreeMap<u32, Vec<Option<f64>>>,
     feeds_through: bool,
-    /// Whether an output at the end of a step may depend on an input of the step at once.
-    step_feeds_through: bool,
     /// Time of the FMU at t = 0, s.
     start_time_s: f64,
     teardown_errors: TeardownErrors,
@@ -98,8 +96,6 @@ impl FmuSubsystem {
             bodies: Bodies::default(),
             starts: BTreeMap::new(),
             feeds_through: feeds_through(&description, &description.initial_unknowns),
-            // a clock ticks at a communication point, with the values of that time
-            step_feeds_through: !clocks && feeds_through(&description, &[]),
             start_time_s: options.start_time_s,
             teardown_errors: TeardownErrors::default(),
             host,
@@ -406,13 +402,18 @@ impl Subsystem for FmuSubsystem {
             (c.serialize && !self.clocks, Capabilities::SERIALIZE),
             (!self.bodies.is_empty(), Capabilities::FORCE),
             (self.feeds_through, Capabilities::FEEDTHROUGH),
-            (self.step_feeds_through, Capabilities::STEP_FEEDTHROUGH),
             (!c.variable_step, Capabilities::FIXED_STEP),
             (derivatives, Capabilities::DERIVATIVES),
+            (self.knows_directional(), Capabilities::DIRECTIONAL),
             (c.output_derivatives, Capabilities::OUTPUT_DERIVATIVES),
         ];
         let own = all.into_iter().filter(|(has, _)| *has).map(|(_, what)| what);
         own.fold(Capabilities::default(), |set, what| set | what)
+    }
+
+    fn feed_through(&self) -> Vec<FeedThrough> {
+        // a clock ticks at a communication point, with the values of that time
+        if self.clocks { Vec::new() } else { map::feed_through(self.instance.description(), &self.places) }
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
@@ -510,13 +511,13 @@ impl Subsystem for FmuSubsystem {
         out: &mut [f64],
     ) -> Result {
         let (mut z, mut v) = (Vec::new(), Vec::new());
-        if !self.instance.description().capabilities.tells_derivatives()
-            || !self.collect(unknowns, &mut z)?
-            || !self.collect(knowns, &mut v)?
-        {
+        if !self.instance.description().capabilities.tells_derivatives() {
             return Err(Error::Unsupported);
         }
-        self.instance.directional_derivative(&z, &v, seed, out).map_err(error)
+        if self.collect(unknowns, &mut z)? && self.collect(knowns, &mut v)? {
+            return self.instance.directional_derivative(&z, &v, seed, out).map_err(error);
+        }
+        self.derivatives_of_arrays(unknowns, knowns, seed, out)
     }
 
     fn output_derivatives(&self, ids: &[u32], out: &mut [f64]) -> Result {

@@ -1,8 +1,9 @@
 //! FMI variables as variables of a scenario: array elements get names of their own, `foot.position[2,1]`.
 
+use std::collections::BTreeMap;
 use terraglue_fmi::description::{self as fmi, ModelDescription, Variability};
 use terraglue_scenario::did_you_mean;
-use terraglue_subsystem::{Effect, ValueType, Variable};
+use terraglue_subsystem::{Effect, FeedThrough, ValueType, Variable};
 
 /// Where the value of a variable of the scenario lies in the FMU.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +70,36 @@ pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Varia
         }
     }
     (all, places)
+}
+
+/// Outputs that follow inputs at once, by the model structure.
+pub fn feed_through(description: &ModelDescription, places: &[ValueLocation]) -> Vec<FeedThrough> {
+    let mut ids: Vec<Option<[u32; 2]>> = vec![None; description.variables.len()];
+    for (id, place) in places.iter().enumerate().filter(|(_, p)| p.element == 0) {
+        ids[place.variable as usize] = Some([id as u32, id as u32 + place.count]);
+    }
+    let is_input = |k: usize| description.variables[k].causality == fmi::Causality::Input;
+    if !(0..ids.len()).any(is_input) {
+        return Vec::new();
+    }
+    // aliases share the number of their variable, in FMI 2 among those of a type
+    let key = |v: &fmi::Variable| (v.value_type as u32, v.reference);
+    let mut names: BTreeMap<_, Vec<[u32; 2]>> = BTreeMap::new();
+    for (v, ids) in description.variables.iter().zip(&ids) {
+        names.entry(key(v)).or_default().extend(ids);
+    }
+    let same = |k: usize| names.get(&key(&description.variables[k])).into_iter().flatten().copied();
+    let mut all = Vec::new();
+    for unknown in &description.outputs {
+        let mut inputs = match &unknown.dependencies {
+            None => vec![FeedThrough::ALL],
+            Some(on) => on.iter().filter(|k| is_input(**k)).flat_map(|k| same(*k)).collect(),
+        };
+        inputs.sort_unstable();
+        inputs.dedup();
+        all.extend(same(unknown.variable).map(|outputs| FeedThrough { outputs, inputs: inputs.clone() }));
+    }
+    all
 }
 
 /// `name`, or `name[i,j]` from 1 for an element of an array.

@@ -3,13 +3,16 @@
 //! A file with the role `result` holds the outputs of the default experiment, as in the Modelica Reference FMUs; the inputs of this
 //! experiment are those of a file with the role `experiment`, where there is one. Both are tables as `fmu run` reads and writes them.
 
+use super::map::element_name;
 use super::simulate::{self, Settings, Tables};
-use super::table::Table;
+use super::table::{InputRow, Table};
 use std::fmt::Write;
 use std::sync::Arc;
+use terraglue_fmi::description::Variable;
 use terraglue_fmi::instance::Sink;
 use terraglue_fmi::references::{FOLDER, MANIFEST, Related, related};
 use terraglue_fmi::{Error, Fmu, Result};
+use terraglue_subsystem::ValueType;
 
 /// How far an output is from its reference.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +36,8 @@ pub struct Rerun {
     pub rows: usize,
     /// Of each column.
     pub deviations: Vec<Deviation>,
+    /// Columns for which the FMU has no variable, as where one file serves FMUs of both versions.
+    pub foreign: Vec<String>,
 }
 
 /// Runs the default experiment of an FMU as often as it holds results of it, and compares.
@@ -54,7 +59,7 @@ pub fn rerun(fmu: &Arc<Fmu>, sink: impl Fn() -> Sink) -> Result<Vec<Rerun>> {
     let input = Arc::new(tables("experiment").next().map(table).transpose()?.unwrap_or_default());
     let mut all = Vec::new();
     for file in tables("result") {
-        let wanted = table(file)?;
+        let (wanted, foreign) = fitted(fmu, &table(file)?)?;
         let (Some(first), Some(last)) = (wanted.rows.first(), wanted.rows.last()) else { continue };
         let settings = Settings {
             outputs: variables(fmu, &wanted.names),
@@ -63,27 +68,84 @@ pub fn rerun(fmu: &Arc<Fmu>, sink: impl Fn() -> Sink) -> Result<Vec<Rerun>> {
             input: Arc::clone(&input),
             ..Settings::default()
         };
-        let found = run(fmu, &settings, sink())?;
+        let (found, _) = fitted(fmu, &run(fmu, &settings, sink())?)?;
         let deviations =
             wanted.names.iter().enumerate().map(|(k, name)| deviation(name, (&wanted, k), &found));
         let deviations = deviations.collect::<Result<_>>()?;
-        all.push(Rerun { file: file.path.display().to_string(), rows: wanted.rows.len(), deviations });
+        all.push(Rerun {
+            file: file.path.display().to_string(),
+            rows: wanted.rows.len(),
+            deviations,
+            foreign,
+        });
     }
     Ok(all)
 }
 
-/// Names of the variables of columns, which may be elements of arrays, each once.
+/// The variable of a column, which may be an element of it.
+fn variable<'a>(fmu: &'a Fmu, column: &str) -> Option<&'a Variable> {
+    let description = fmu.description();
+    let base = column.rfind('[').map_or(column, |at| &column[..at]);
+    let k = description.position(column).or_else(|| description.position(base))?;
+    Some(&description.variables[k])
+}
+
+/// Names of the variables of columns, each once.
 fn variables(fmu: &Fmu, columns: &[String]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
-    for column in columns {
-        let whole = fmu.description().position(column).is_some();
-        let base = column.rfind('[').map_or(column.as_str(), |at| &column[..at]);
-        let name = if whole { column.as_str() } else { base };
-        if names.iter().all(|n| n != name) {
-            names.push(name.to_owned());
+    for v in columns.iter().filter_map(|column| variable(fmu, column)) {
+        if names.iter().all(|n| *n != v.name) {
+            names.push(v.name.clone());
         }
     }
     names
+}
+
+/// A table with a column for each element of an array, which results may hold in one cell, and numbers for truth values; and the columns
+/// for which the FMU has no variable.
+fn fitted(fmu: &Fmu, table: &Table) -> Result<(Table, Vec<String>)> {
+    let mut fitted = Table {
+        names: Vec::new(),
+        rows: table.rows.iter().map(|row| InputRow { time: row.time, ..InputRow::default() }).collect(),
+    };
+    let mut foreign = Vec::new();
+    for (k, name) in table.names.iter().enumerate() {
+        let Some(v) = variable(fmu, name) else {
+            foreign.push(name.clone());
+            continue;
+        };
+        let whole = !v.sizes.is_empty()
+            && v.name == *name
+            && !matches!(v.value_type, ValueType::String | ValueType::Binary);
+        match whole {
+            true => fitted.names.extend((0..v.len()).map(|element| element_name(v, element))),
+            false => fitted.names.push(name.clone()),
+        }
+        for (row, from) in fitted.rows.iter_mut().zip(&table.rows) {
+            let cell = from.cells[k].as_str();
+            let words: Vec<&str> = if whole { cell.split_whitespace().collect() } else { vec![cell] };
+            if whole && words.len() != v.len() {
+                let (count, time) = (words.len(), from.time);
+                return Err(Error::Refused(format!(
+                    "reference result: `{name}` has {count} values at t = {time} s, and {} elements",
+                    v.len()
+                )));
+            }
+            let plain = |word: &str| match (v.value_type, word) {
+                (ValueType::Bool, "true") => "1".to_owned(),
+                (ValueType::Bool, "false") => "0".to_owned(),
+                _ => word.to_owned(),
+            };
+            row.cells.extend(words.into_iter().map(plain));
+        }
+    }
+    if let (true, Some(name)) = (fitted.names.is_empty(), foreign.first()) {
+        return Err(Error::Refused(format!("reference result: the FMU has no output `{name}`")));
+    }
+    for row in &mut fitted.rows {
+        row.numbers = row.cells.iter().map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
+    }
+    Ok((fitted, foreign))
 }
 
 /// The table of a run.

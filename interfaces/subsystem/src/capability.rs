@@ -31,10 +31,8 @@ impl Capabilities {
     pub const SEES: Self = Self(8192);
     /// `shape_visibility` is implemented; without it all shapes are shown and it is not called.
     pub const HIDES: Self = Self(16384);
-    /// Outputs at the end of a step depend directly on the inputs of that step, and values of a trial can be read before it is
-    /// committed. Of FMUs; unknown to the C interface of modules.
-    pub const STEP_FEEDTHROUGH: Self = Self(1 << 31);
-
+    /// `directional_derivative` is implemented. Of FMUs; unknown to the C interface of modules.
+    pub const DIRECTIONAL: Self = Self(1 << 31);
     /// `output_derivatives` is implemented. Of FMUs in this process; unknown to the C interface of modules.
     pub const OUTPUT_DERIVATIVES: Self = Self(1 << 30);
 

@@ -4,6 +4,7 @@ use crate::capability::Capabilities;
 use crate::config::Config;
 use crate::energy::Energy;
 use crate::error::{Error, Result};
+use crate::feed_through::FeedThrough;
 use crate::field::{FieldInfo, FieldTile};
 use crate::host::Host;
 use crate::overlay::Overlay;
@@ -182,6 +183,12 @@ pub trait Subsystem: Send {
         _out: &mut [f64],
     ) -> Result {
         Err(Error::Unsupported)
+    }
+
+    /// Outputs that follow inputs of a step at once, at its end, one entry for each output whose inputs are known. Where there is any,
+    /// values of a trial can be read before it is committed. Of FMUs; unknown to the C interface of modules.
+    fn feed_through(&self) -> Vec<FeedThrough> {
+        Vec::new()
     }
 
     /// Derivatives of f64 outputs by time at the committed time, per second. Asked of an instance with

@@ -3,6 +3,7 @@
 use super::access::{Directory, VariableRef};
 use super::discrete::{self, Discrete};
 use super::extrapolation::{Extrapolation, Moment};
+use super::feed_through::FeedThroughs;
 use super::pattern;
 use super::stream_link::{self, StreamLink};
 use super::table;
@@ -116,6 +117,14 @@ impl Link {
             None => Extrapolate::Constant,
             Some(line) if line.by_derivatives() => Extrapolate::Derivatives,
             Some(_) => Extrapolate::Linear,
+        }
+    }
+
+    /// Settles which inputs take the value at the end of a step, where they follow a line.
+    fn settle_ends(&mut self, of: &FeedThroughs) {
+        let ends: Vec<bool> = self.input_ids().iter().map(|id| of.takes_end((self.to, *id))).collect();
+        if let Some(line) = &mut self.extrapolation {
+            line.set_ends(ends);
         }
     }
 
@@ -262,6 +271,12 @@ pub struct Links {
 }
 
 impl Links {
+    /// Subsystem and variable on either side of every value.
+    pub fn ends(&self, instances: &[Instance]) -> Vec<[(usize, u32); 2]> {
+        let numbers = self.numbers.iter().flat_map(|link| link.ends().map(|(ends, _)| ends));
+        numbers.chain(self.discrete.iter().map(|d| d.end_ids(instances))).collect()
+    }
+
     /// Takes a message of a stream, by its number among all, on its way to the inputs that it feeds.
     pub fn feed(&mut self, stream: usize, bytes: &[u8]) {
         self.streams.iter_mut().filter(|link| link.stream() == stream).for_each(|link| link.take(bytes));
@@ -337,7 +352,13 @@ pub fn connect(
             return Err(resolving.refuse(connection, &connection.from, message, help));
         }
     }
-    Ok(resolving.links)
+    let mut links = resolving.links;
+    let extrapolated = |link: &Link| link.extrapolation.is_some();
+    if links.numbers.iter().any(extrapolated) {
+        let of = FeedThroughs::new(instances, &links.ends(instances));
+        links.numbers.iter_mut().filter(|l| extrapolated(l)).for_each(|link| link.settle_ends(&of));
+    }
+    Ok(links)
 }
 
 /// Connections on their way into links.
@@ -409,6 +430,7 @@ impl Resolving<'_> {
             let conversion = check(connection, instances, (name, from), (&target, to))
                 .map_err(|message| self.refuse(connection, &connection.to, message, None))?;
             self.feed(connection, name, (&target, to))?;
+            self.check_order(connection, name, from)?;
             if from.describe(instances).value_type == ValueType::F64 {
                 self.add([from, to], conversion, connection);
                 continue;
@@ -421,6 +443,24 @@ impl Resolving<'_> {
         Ok(matched)
     }
 
+    /// Iteration is for numbers of 64 bits: the residual of other values says nothing about the next ones.
+    fn check_order(
+        &self,
+        connection: &Connection,
+        name: &str,
+        from: VariableRef,
+    ) -> std::result::Result<(), Box<InputError>> {
+        let value_type = from.describe(self.instances).value_type;
+        if connection.order != ConnectionOrder::Iterate || value_type == ValueType::F64 {
+            return Ok(());
+        }
+        let own = format!("{value_type:?}").to_lowercase();
+        let message = format!("`{name}` is of type {own}: only numbers of 64 bits can be iterated");
+        let help = "leave `order = \"iterate\"` of this connection out: then its value is passed in the order of the model structure, or \
+                    late by a step in a loop";
+        Err(self.refuse(connection, "order", message, Some(help.into())))
+    }
+
     /// All streams that a connection names; false: it names none.
     fn streams(&mut self, connection: &Connection) -> std::result::Result<bool, Box<InputError>> {
         let directory = self.directory;
@@ -428,6 +468,11 @@ impl Resolving<'_> {
         for (number, name) in directory.streams().iter().enumerate() {
             let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) else { continue };
             matched = true;
+            if connection.order == ConnectionOrder::Iterate {
+                let message = format!("`{name}` is a stream: only numbers of 64 bits can be iterated");
+                let help = "leave `order = \"iterate\"` of this connection out: messages are late by a step";
+                return Err(self.refuse(connection, "order", message, Some(help.into())));
+            }
             let to = self.find(connection, name, &target)?;
             stream_link::check(connection, self.instances, name, (&target, to))
                 .map_err(|message| self.refuse(connection, &connection.to, message, None))?;
@@ -446,10 +491,9 @@ impl Resolving<'_> {
             l.from == from.slot && l.to == to.slot && l.order == order && l.extrapolates() == extrapolate
         };
         let k = links.iter().position(same).unwrap_or_else(|| {
-            let takes_end = instances[to.slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
             let by_derivatives = extrapolate == Extrapolate::Derivatives;
             let multiples = [from, to].map(|end| multiples[end.slot]);
-            let line = || Extrapolation::new(multiples, takes_end, by_derivatives);
+            let line = || Extrapolation::new(multiples, by_derivatives);
             let extrapolation = (extrapolate != Extrapolate::Constant).then(|| Box::new(line()));
             let (ids, numbers) = (Vec::new(), Vec::new());
             let within = false;

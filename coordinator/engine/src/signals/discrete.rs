@@ -26,8 +26,10 @@ pub struct Discrete {
 }
 
 /// A value on its way.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 enum Value {
+    /// None was read yet.
+    None,
     Whole(i128),
     Single([f32; 1]),
     Text([String; 1]),
@@ -64,7 +66,7 @@ impl Discrete {
         order: ConnectionOrder,
     ) -> Self {
         let conversion = Some(conversion).filter(|c| *c != (1.0, 0.0));
-        Self { from, to, table, conversion, order, within: false, value: Value::Whole(0) }
+        Self { from, to, table, conversion, order, within: false, value: Value::None }
     }
 
     /// Whether it may pass values within a step where that avoids a delay.
@@ -97,9 +99,40 @@ impl Discrete {
         [self.from, self.to]
     }
 
+    /// The value that its input has now, from and to itself; none where the input cannot be read.
+    pub fn of_input(&self, instances: &[Instance]) -> Self {
+        let mut own = Self::new([self.to; 2], None, (1.0, 0.0), self.order);
+        if own.read(instances).is_err() {
+            own.value = Value::None;
+        }
+        own
+    }
+
+    /// `a.n → b.n`.
+    pub fn label(&self, instances: &[Instance]) -> String {
+        let [from, to] =
+            self.ends().map(|end| format!("{}.{}", instances[end.slot].name(), end.describe(instances).name));
+        format!("{from} → {to}")
+    }
+
+    /// Subsystem and variable on either side.
+    pub fn end_ids(&self, instances: &[Instance]) -> [(usize, u32); 2] {
+        self.ends().map(|end| (end.slot, end.describe(instances).id))
+    }
+
     /// Whether it feeds a variable of a subsystem.
     pub fn feeds(&self, instances: &[Instance], slot: usize, id: u32) -> bool {
         self.to.slot == slot && self.to.describe(instances).id == id
+    }
+
+    /// Takes the value; whether it is another one than the input was given last.
+    ///
+    /// # Errors
+    /// As of [`Discrete::read`].
+    pub fn read_anew(&mut self, instances: &[Instance]) -> Result<bool> {
+        let before = std::mem::replace(&mut self.value, Value::None);
+        self.read(instances)?;
+        Ok(self.value != before)
     }
 
     /// Takes the committed value.
@@ -179,6 +212,7 @@ impl Discrete {
             (_, Value::Text(text)) => instances[to.slot].set(&id, Values::String(text))?,
             (_, Value::Bytes(bytes)) => instances[to.slot].set(&id, Values::Binary(bytes))?,
             (_, Value::Whole(w)) => return Err(narrow(instances, *w)),
+            (_, Value::None) => return Ok(()),
         };
         match reply {
             Reply::Accepted => Ok(()),

@@ -30,8 +30,8 @@ pub struct Moment {
 pub struct Extrapolation {
     /// Steps of the testbed per step of the source and of the target.
     multiples: [u64; 2],
-    /// Whether the target takes the value at the end of its step.
-    takes_end: bool,
+    /// Whether the target takes each value at the end of its step.
+    takes_end: Vec<bool>,
     /// Whether the source provides the slope; else the line runs through its last two values.
     by_derivatives: bool,
     /// Time of the last values, s; NaN before the first ones.
@@ -48,10 +48,10 @@ pub struct Extrapolation {
 
 impl Extrapolation {
     /// Of a source and a target that make one step per so many of the testbed.
-    pub fn new(multiples: [u32; 2], takes_end: bool, by_derivatives: bool) -> Self {
+    pub fn new(multiples: [u32; 2], by_derivatives: bool) -> Self {
         Self {
             multiples: multiples.map(|n| u64::from(n.max(1))),
-            takes_end,
+            takes_end: Vec::new(),
             by_derivatives,
             last_s: f64::NAN,
             seen: [0; 2],
@@ -60,6 +60,11 @@ impl Extrapolation {
             start: Vec::new(),
             ahead: Vec::new(),
         }
+    }
+
+    /// Says which of the values the target takes at the end of its step.
+    pub fn set_ends(&mut self, takes_end: Vec<bool>) {
+        self.takes_end = takes_end;
     }
 
     /// Whether the source provides its slopes.
@@ -104,7 +109,7 @@ impl Extrapolation {
             self.last.extend_from_slice(values);
             self.last_s = t;
         }
-        let Self { last, slope, start, ahead, last_s, .. } = self;
+        let Self { last, slope, start, ahead, last_s, takes_end, .. } = self;
         let (last, slope, since) = (&*last, &*slope, *last_s);
         let line = |time: f64| last.iter().zip(slope).map(move |(x, s)| x + s * (time - since));
         if first || self.multiples[1] == 1 || now[1] != self.seen[1] {
@@ -112,8 +117,9 @@ impl Extrapolation {
             start.extend(line(t));
         }
         ahead.clear();
-        let takes_end = self.takes_end;
-        ahead.extend(line(t + h).zip(&*start).map(|(end, start)| held(takes_end, *start, end)));
+        let ends = takes_end.iter().copied().chain(std::iter::repeat(false));
+        let values = line(t + h).zip(&*start).zip(ends);
+        ahead.extend(values.map(|((end, start), takes_end)| held(takes_end, *start, end)));
         self.seen = now;
         Ok(())
     }
@@ -152,7 +158,8 @@ mod tests {
 
     /// Value of the inputs at the last of some steps, of a source with the value u(t) in its own last step.
     fn ahead(multiples: [u32; 2], takes_end: bool, steps: u64, u: impl Fn(f64) -> f64) -> f64 {
-        let mut line = Extrapolation::new(multiples, takes_end, false);
+        let mut line = Extrapolation::new(multiples, false);
+        line.set_ends(vec![takes_end]);
         let source = u64::from(multiples[0]);
         for nominal in 0..steps {
             let told = (nominal / source * source) as f64 * H;
@@ -178,7 +185,8 @@ mod tests {
     #[test]
     fn the_first_step_and_a_step_that_is_repeated_have_no_other_line() {
         assert_eq!(ahead([1, 1], false, 1, |t| 1.0 + t), 1.0);
-        let mut line = Extrapolation::new([1, 1], true, false);
+        let mut line = Extrapolation::new([1, 1], false);
+        line.set_ends(vec![true]);
         take(&mut line, Moment { t: 0.0, h: H, nominal: 0 }, 1.0);
         take(&mut line, Moment { t: H, h: H, nominal: 1 }, 2.0);
         take(&mut line, Moment { t: H, h: 0.5 * H, nominal: 1 }, 2.0);
@@ -187,7 +195,7 @@ mod tests {
 
     #[test]
     fn slopes_that_are_told_are_the_line_and_the_first_step_is_held() {
-        let mut line = Extrapolation::new([1, 1], false, true);
+        let mut line = Extrapolation::new([1, 1], true);
         take(&mut line, Moment { t: 0.0, h: H, nominal: 0 }, 1.0);
         assert_eq!(line.ahead(), Some(&[1.0][..]));
         // the last two values have another slope

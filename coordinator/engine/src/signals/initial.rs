@@ -1,4 +1,4 @@
-//! Values that are connected at the start: passed on in the order in which they depend on each other, loops by Newton.
+//! Values that are connected at the start: passed on in the order in which they depend on each other, loops of numbers by Newton.
 //!
 //! FMUs answer with outputs that depend on inputs of the same time while they initialise. A chain is settled by
 //! passing values on until nothing changes. Values that still change form a loop: r(u) = y(u) − u = 0 over all connected
@@ -6,6 +6,8 @@
 //! differences.
 
 use super::connection::{Link, derivatives};
+use super::discrete::Discrete;
+use crate::graph::components;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::Instance;
 use terraglue_numerics::dense::Lu;
@@ -42,6 +44,19 @@ pub fn initialize(links: &mut [Link], instances: &mut [Instance]) -> Result {
         Err(Error::Simulation { .. }) => newton(links, instances, start, false),
         solved => solved,
     }
+}
+
+/// Passes all discrete values on once, and answers which are others than before. A value that cannot be read yet, as its `map` has no entry
+/// for it, is left to the first step.
+///
+/// # Errors
+/// A value that a subsystem refuses.
+pub fn initialize_discrete(links: &mut [Discrete], instances: &mut [Instance]) -> Result<Vec<usize>> {
+    let read = links.iter_mut().enumerate();
+    let new = read.filter_map(|(k, link)| link.read_anew(instances).unwrap_or(false).then_some(k));
+    let new: Vec<usize> = new.collect();
+    new.iter().try_for_each(|k| links[*k].pass_on(instances))?;
+    Ok(new)
 }
 
 /// `known`: with the derivatives that subsystems provide.
@@ -138,15 +153,33 @@ fn unsolved(links: &mut [Link], instances: &mut [Instance], u: &[f64], residual:
             }
         }
     }
+    let numeric: Vec<bool> = (0..n).map(|k| reach[k][k]).collect();
+    let in_loop = if numeric.contains(&true) { numeric } else { around(links, instances.len(), residual, u) };
     let names: Vec<String> = links.iter().flat_map(|l| l.names(instances)).collect();
-    let in_loop: Vec<&str> =
-        names.iter().enumerate().filter(|(k, _)| reach[*k][*k]).map(|(_, n)| n.as_str()).collect();
+    let connections: Vec<&str> =
+        names.iter().zip(&in_loop).filter(|(_, own)| **own).map(|(name, _)| name.as_str()).collect();
     let left = size(residual);
     let message = format!(
-        "the loop of connections {} has no solution at the start; the values miss each other by {left:.3e}",
-        in_loop.join(", ")
+        "the loop of connections {} has no solution at the start; the values miss each other by {left:.3e}. Ways out: start values of these FMUs \
+         nearer to a solution, or one connection less",
+        connections.join(", ")
     );
     Ok(Error::Simulation { time_s: 0.0, message })
+}
+
+/// Values of the loops of subsystems in which values miss each other, where derivatives show no loop.
+fn around(links: &[Link], count: usize, residual: &[f64], u: &[f64]) -> Vec<bool> {
+    let edges: Vec<[usize; 2]> = links.iter().map(Link::slots).collect();
+    let component = components(count, &edges);
+    let slots: Vec<[usize; 2]> = links.iter().flat_map(|l| (0..l.count()).map(|_| l.slots())).collect();
+    let misses = |k: usize| residual[k].is_nan() || residual[k].abs() > 1e-10 * scale(u);
+    let circle = |[from, to]: [usize; 2]| component[from] == component[to];
+    let open = |k: usize| misses(k) && circle(slots[k]);
+    let bad: Vec<usize> = (0..slots.len()).filter(|k| open(*k)).map(|k| component[slots[k][1]]).collect();
+    let own = |k: usize| {
+        if bad.is_empty() { misses(k) } else { circle(slots[k]) && bad.contains(&component[slots[k][1]]) }
+    };
+    (0..slots.len()).map(own).collect()
 }
 
 fn read(links: &mut [Link], instances: &mut [Instance]) -> Result<Vec<f64>> {

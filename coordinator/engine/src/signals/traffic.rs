@@ -2,7 +2,7 @@
 //! variables are found.
 
 use super::fault::Change;
-use super::{Directory, Faults, Link, Links, Moment, TimeLine, initialize};
+use super::{Directory, Discrete, Faults, Link, Links, Moment, TimeLine, initialize, initialize_discrete};
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::Recall;
 use terraglue_host::Instance;
@@ -19,6 +19,8 @@ pub struct Signals {
     pub time_line: TimeLine,
     /// Faults of values on their way.
     pub faults: Faults,
+    /// Whether it was told that discrete values do not settle at the start.
+    pub told: bool,
 }
 
 impl Signals {
@@ -41,14 +43,40 @@ impl Signals {
         self.time_line.next_time(t).min(self.faults.next_time(t))
     }
 
-    /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
+    /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops of numbers solved.
     ///
     /// # Errors
     /// A loop without a solution, or what a module refuses.
     pub fn initialize(&mut self, instances: &mut [Instance]) -> Result {
-        let through = |k: usize| instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
-        if self.links.numbers.iter().any(|l| l.leaves(through)) {
-            initialize(&mut self.links.numbers, instances)?;
+        let through: Vec<bool> =
+            instances.iter().map(|i| i.capabilities().has(Capabilities::FEEDTHROUGH)).collect();
+        let Links { numbers, discrete, .. } = &mut self.links;
+        let numbers_pass = numbers.iter().any(|link| link.leaves(|slot| through[slot]));
+        if numbers_pass {
+            initialize(numbers, instances)?;
+        }
+        if !discrete.iter().any(|link| numbers_pass || through[link.ends()[0].slot()]) {
+            return Ok(());
+        }
+        let before: Vec<Discrete> = discrete.iter().map(|link| link.of_input(instances)).collect();
+        let mut new = Vec::new();
+        // numbers may depend on discrete values and these on numbers, so both are passed until nothing changes
+        for _ in 0..=discrete.len() {
+            new = initialize_discrete(discrete, instances)?;
+            if new.is_empty() {
+                return Ok(());
+            }
+            if numbers_pass {
+                initialize(numbers, instances)?;
+            }
+        }
+        let names: Vec<String> = new.iter().map(|k| discrete[*k].label(instances)).collect();
+        new.into_iter().try_for_each(|k| before[k].pass_on(instances))?;
+        if !std::mem::replace(&mut self.told, true) {
+            log::warn!(
+                "connected values that do not settle at the start are late by a step: {}",
+                names.join(", ")
+            );
         }
         Ok(())
     }

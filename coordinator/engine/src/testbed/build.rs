@@ -14,7 +14,7 @@ use super::streams::Streams;
 use super::subsystems::{Member, Subsystems};
 use super::uncoupled::Uncoupled;
 use super::{Options, Testbed};
-use crate::signals::{self, Directory, Faults, Signals, TimeLine};
+use crate::signals::{self, Directory, Faults, FeedThroughs, Signals, TimeLine};
 use std::sync::Arc;
 use std::time::Duration;
 use terraglue_diagnostics::{Error, Result};
@@ -95,9 +95,7 @@ impl Testbed {
         }
         let streams = Streams::new(&subsystems.instances);
         let Subsystems { instances, schedules, .. } = &mut subsystems;
-        let order = StepOrder::new(&mut signals.links, &signals.faults, instances, schedules);
-        let loops = Loops::new(&signals.links, &signals.faults, instances, schedules, services.slots - 1)
-            .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
+        let (order, loops) = order(&mut signals, instances, schedules, services.slots - 1)?;
         Ok(Self {
             exact: takes_parts(scenario, &subsystems.instances),
             subsystems,
@@ -121,6 +119,22 @@ impl Testbed {
     }
 }
 
+/// The order of the steps, and the loops in it; `state`: number of a state that nobody else keeps.
+fn order(
+    signals: &mut Signals,
+    instances: &[Instance],
+    schedules: &mut [StepSchedule],
+    state: u32,
+) -> Result<(StepOrder, Loops)> {
+    let Signals { links, faults, .. } = signals;
+    let feed_through = FeedThroughs::new(instances, &links.ends(instances));
+    let mut order = StepOrder::new(links, faults, &feed_through, instances, schedules);
+    let loops = Loops::new(links, faults, &feed_through, instances, schedules, state)
+        .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
+    order.put_behind_loops(loops.followers(), links, instances, schedules);
+    Ok((order, loops))
+}
+
 /// Warns of keys without effect and of doubtful values.
 fn advise(scenario: &Scenario) {
     let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
@@ -138,7 +152,7 @@ fn signals(scenario: &Scenario, instances: &[Instance]) -> Result<Signals> {
     let time_line = TimeLine::new(&scenario.events, &directory, instances, source)?;
     let random = (scenario.world.seed, scenario.time.step_s);
     let faults = Faults::new(&scenario.faults, &links, &directory, instances, source, random)?;
-    Ok(Signals { links, directory, time_line, faults })
+    Ok(Signals { links, directory, time_line, faults, told: false })
 }
 
 /// Groups with the detection of their contacts.
@@ -155,7 +169,7 @@ fn glued(
         control: control(scenario, &groups, instances)?,
         groups,
         no_ports: PortSet::default(),
-        failed: "none",
+        failed: None,
         gravity,
         contact_margin_m: scenario.gluing.contact_margin_m,
     })

@@ -2,6 +2,7 @@
 
 use super::Testbed;
 use super::group::Group;
+use super::loops::Loops;
 use super::schedule::StepSchedule;
 use super::step_order::StepOrder;
 use crate::signals::{Links, VariableRef, streams};
@@ -45,6 +46,7 @@ impl Testbed {
             schedules: &self.subsystems.schedules,
             groups: &self.glued.groups,
             order: self.uncoupled.order(),
+            loops: self.uncoupled.loops(),
         };
         let ends = sight.ends();
         Explanation {
@@ -62,6 +64,7 @@ struct Explained<'a> {
     schedules: &'a [StepSchedule],
     groups: &'a [Group],
     order: &'a StepOrder,
+    loops: &'a Loops,
 }
 
 impl Explained<'_> {
@@ -116,9 +119,10 @@ impl Explained<'_> {
         let name = |slot: usize| self.instances[slot].name();
         let mut order = Vec::new();
         let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
-        if self.links.numbers.iter().any(|l| l.leaves(through)) {
+        let discrete = self.links.discrete.iter().any(|l| through(l.ends()[0].slot()));
+        if discrete || self.links.numbers.iter().any(|l| l.leaves(through)) {
             order.push(
-                "once, at the start: connected values are passed on until they agree, loops by Newton".into(),
+                "once, at the start: connected values are passed on until they agree, loops of numbers by Newton".into(),
             );
         }
         order.push("events and faults of the communication point".into());
@@ -136,6 +140,24 @@ impl Explained<'_> {
                 list(&to)
             ));
         }
+        order.extend(self.steps_without_glue());
+        for group in self.groups {
+            let members: Vec<&str> = group.problem.members().map(name).collect();
+            order.push(format!(
+                "glued together by `{}`, without delay: {}",
+                group.strategy.name(),
+                members.join(", ")
+            ));
+        }
+        let all: Vec<&str> = self.instances.iter().map(Instance::name).collect();
+        order.push(format!("the step is accepted by all: {}", all.join(", ")));
+        order
+    }
+
+    /// Steps of subsystems without glue, level by level.
+    fn steps_without_glue(&self) -> Vec<String> {
+        let name = |slot: usize| self.instances[slot].name();
+        let mut order = Vec::new();
         let first = |(_, turn): &(&Instance, &StepSchedule)| !turn.glued && turn.level == 0;
         let alone = self.instances.iter().zip(self.schedules).filter(first);
         let alone: Vec<String> = alone
@@ -147,21 +169,17 @@ impl Explained<'_> {
         if !alone.is_empty() {
             order.push(format!("a step of each subsystem without glue, in any order: {}", alone.join(", ")));
         }
-        for level in 1..self.order.levels() {
+        let level_note = |level: usize| {
             let follows = self.schedules.iter().enumerate().filter(|(_, turn)| turn.level as usize == level);
             let follows: Vec<&str> = follows.map(|(slot, _)| name(slot)).collect();
-            order.push(format!("then a step of those that take outputs of its end: {}", follows.join(", ")));
+            format!("then a step of those that take outputs of its end: {}", follows.join(", "))
+        };
+        let before = self.order.levels_before_loops();
+        order.extend((1..before).map(level_note));
+        if !self.loops.is_empty() {
+            order.push("the FMUs of loops repeat the step until their values stand".into());
         }
-        for group in self.groups {
-            let members: Vec<&str> = group.problem.members().map(name).collect();
-            order.push(format!(
-                "glued together by `{}`, without delay: {}",
-                group.strategy.name(),
-                members.join(", ")
-            ));
-        }
-        let all: Vec<&str> = self.instances.iter().map(Instance::name).collect();
-        order.push(format!("the step is accepted by all: {}", all.join(", ")));
+        order.extend((before..self.order.levels()).map(level_note));
         order
     }
 
@@ -252,8 +270,11 @@ impl Explained<'_> {
                 let names: Vec<&str> = members.map(|j| self.instances[j].name()).collect();
                 let mut inside = ends.iter().filter(|e| is_member(e.from.0) && is_member(e.to.0));
                 let how = match inside.all(|e| matches!(e.passes, Passes::Repeatedly | Passes::AtEnd)) {
-                    true => "solved in every step, which its members repeat",
-                    false => "explicit, a connection in it is one step late",
+                    true => format!(
+                        "solved in every step, which its members repeat, {}",
+                        self.loops.way(self.instances, k)
+                    ),
+                    false => "explicit, a connection in it is one step late".to_owned(),
                 };
                 format!("{}: {how}", names.join(" ⇄ "))
             })

@@ -23,8 +23,8 @@ pub(super) struct GluedGroups {
     pub no_ports: PortSet,
     /// Sets the length of steps, where the scenario asks for it.
     pub control: Option<StepControl>,
-    /// The strategy that did not converge last.
-    pub failed: &'static str,
+    /// The strategy that did not converge in the last step; none: what is not glued stopped it.
+    pub failed: Option<&'static str>,
     /// Gravity of the world, m/s².
     pub gravity: [f64; 3],
     /// Distance before contact at which a port is made, m.
@@ -135,7 +135,7 @@ impl GluedGroups {
                 outcome => outcome?,
             };
             if outcome != Outcome::Converged {
-                self.failed = group.strategy.name();
+                self.failed = Some(group.strategy.name());
                 return Ok(outcome);
             }
         }
@@ -158,10 +158,14 @@ impl GluedGroups {
         self.groups.iter().for_each(|g| report.add(&g.problem.report));
     }
 
-    /// The error of a step at time t that did not converge after all halvings.
+    /// The error of a step at time t that was not made after all halvings.
     pub fn gave_up(&self, t: f64, max_halvings: u32, message: &str) -> Error {
+        let Some(strategy) = self.failed else {
+            let message = format!("{message}; the step was halved {max_halvings} times");
+            return Error::Simulation { time_s: t, message };
+        };
         Error::NotConverged {
-            strategy: self.failed,
+            strategy,
             time_s: t,
             message: format!(
                 "{message}; the step was halved {max_halvings} times. Try a smaller time.step_s, another gluing.form, \

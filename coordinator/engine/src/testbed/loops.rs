@@ -1,73 +1,43 @@
 //! Loops of connections that are solved within a step (`order = "iterate"`): FMUs repeat the step until the outputs at its end are
 //! those that it was made with.
 //!
-//! An FMU whose outputs follow its inputs at once takes the value at the end of the step; any other one takes the mean of the values
+//! An input that outputs of the loop follow at once takes the value at the end of the step; any other one takes the mean of the values
 //! at start and end, which makes the step of second order. Each repetition begins with the state at the start of the step.
+//! FMUs that only take values of a loop are stepped when it is solved.
+//!
 //! The next values are those that Anderson's combination (1965) makes of the last six, of Newton's steps where all FMUs of the loop have
 //! directional derivatives, else of the residuals: loops whose gains are above one are solved, too.
 
-use super::newton::Newton;
+use super::loop_values::LoopValues;
 use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
-use crate::signals::{Faults, Link, Links, held};
+use crate::graph::{components, reached};
+use crate::signals::{Faults, FeedThroughs, Link, Links};
+use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
-use terraglue_gluing::acceleration::Acceleration;
 use terraglue_host::Instance;
-use terraglue_scenario::{ModuleKind, Relaxation};
+use terraglue_scenario::ModuleKind;
 use terraglue_subsystem::{Capabilities, Response};
 
 /// Most repetitions of a step.
 const MOST: u32 = 60;
-/// Largest difference of a value and the one that the step was made with, relative to the larger of it and 1e-3 in its unit.
-const TOLERANCE: f64 = 1e-10;
-
-/// Values that grow by this factor beyond those of start and first trial have no solution.
-const RUNAWAY: f64 = 1e6;
 
 /// The way out of a loop that cannot be iterated.
 pub(super) const NO_LOOP: &str =
     "leave `order = \"iterate\"` of its connections out: then values of a loop are late by a step";
 
-/// A connection of a loop.
-#[derive(Debug)]
-struct Iterated {
-    link: usize,
-    /// Whether its target takes the value at the end of the step.
-    takes_end: bool,
-}
-
 /// All loops of a run.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Loops {
-    links: Vec<Iterated>,
+    loops: Vec<LoopValues>,
     /// Those that repeat the step, ascending.
     members: Vec<usize>,
+    /// Those that take values of a loop within the step, and are not part of it.
+    followers: Vec<usize>,
     /// Number under which they keep the state at its start.
     state: u32,
-    /// Values at the start of the step, and those that the trial was made with.
-    start: Vec<f64>,
-    guess: Vec<f64>,
-    /// Size of the values at start and first trial.
-    scale: Vec<f64>,
-    newton: Newton,
-    acceleration: Acceleration,
-}
-
-impl Default for Loops {
-    fn default() -> Self {
-        Self {
-            links: Vec::new(),
-            members: Vec::new(),
-            state: 0,
-            start: Vec::new(),
-            guess: Vec::new(),
-            scale: Vec::new(),
-            newton: Newton::default(),
-            acceleration: Acceleration::new(Relaxation::Anderson, 1.0),
-        }
-    }
 }
 
 impl Loops {
@@ -78,25 +48,13 @@ impl Loops {
     pub fn new(
         links: &Links,
         faults: &Faults,
+        feed_through: &FeedThroughs,
         instances: &[Instance],
         schedules: &[StepSchedule],
         state: u32,
     ) -> std::result::Result<Self, String> {
-        let iterated = links.numbers.iter().enumerate().filter(|(_, link)| link.is_iterated());
-        let follows = |slot: usize| instances[slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
-        let iterated: Vec<Iterated> =
-            iterated.map(|(k, l)| Iterated { link: k, takes_end: follows(l.slots()[1]) }).collect();
         let mut loops = Self { state, ..Self::default() };
-        let mut open: Vec<usize> = iterated.iter().map(|i| links.numbers[i.link].slots()[1]).collect();
-        while let Some(slot) = open.pop() {
-            if loops.members.contains(&slot) {
-                continue;
-            }
-            loops.members.push(slot);
-            let passes = |link: &&Link| link.is_within_the_step() && link.slots()[0] == slot;
-            open.extend(links.numbers.iter().filter(passes).map(|link| link.slots()[1]));
-        }
-        loops.members.sort_unstable();
+        let component = loops.find_members(links, instances);
         for slot in &loops.members {
             let (instance, schedule) = (&instances[*slot], &schedules[*slot]);
             if let Some(why) = cannot_repeat(instance, schedule) {
@@ -106,30 +64,59 @@ impl Loops {
                 ));
             }
         }
-        if let Some(faulty) = iterated.iter().find(|i| faults.change(i.link)) {
-            let names = links.numbers[faulty.link].names(instances);
-            return Err(format!("a fault changes {}: it cannot be iterated", names.join(", ")));
+        let numbers = links.numbers.iter().enumerate().filter(|(_, link)| link.is_iterated());
+        let mut iterated: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (k, link) in numbers {
+            if faults.change(k) {
+                let names = link.names(instances);
+                return Err(format!("a fault changes {}: it cannot be iterated", names.join(", ")));
+            }
+            iterated.entry(component[link.slots()[1]]).or_default().push(k);
         }
-        loops.newton = Newton::new(iterated.iter().map(|i| i.link), links, &loops.members);
-        loops.links = iterated;
+        for (number, numbers) in iterated {
+            let own = loops.members.iter().copied().filter(|slot| component[*slot] == number).collect();
+            loops.loops.push(LoopValues::new(numbers, links, feed_through, own));
+        }
         Ok(loops)
+    }
+
+    /// Finds those that repeat the step, and those that follow: an FMU that a loop reaches is part of it if it acts on the loop. Answers with
+    /// the number of the loop of each subsystem.
+    fn find_members(&mut self, links: &Links, instances: &[Instance]) -> Vec<usize> {
+        let iterated: Vec<[usize; 2]> =
+            links.numbers.iter().filter(|link| link.is_iterated()).map(Link::slots).collect();
+        let within = links.numbers.iter().filter(|link| link.is_within_the_step()).map(Link::slots);
+        let discrete = links.discrete.iter().filter(|link| link.is_within_the_step());
+        let discrete = discrete.map(|link| link.end_ids(instances).map(|(slot, _)| slot));
+        let edges: Vec<[usize; 2]> = within.chain(discrete).chain(iterated.iter().copied()).collect();
+        let backwards: Vec<[usize; 2]> = edges.iter().map(|[from, to]| [*to, *from]).collect();
+        let count = instances.len();
+        let behind = reached(count, &edges, iterated.iter().map(|[_, to]| *to));
+        let before = reached(count, &backwards, iterated.iter().map(|[from, _]| *from));
+        let repeats = |slot: &usize| before[*slot] || iterated.iter().any(|[_, to]| to == slot);
+        (self.members, self.followers) = (0..count).filter(|slot| behind[*slot]).partition(repeats);
+        components(count, &edges)
+    }
+
+    /// Those that are stepped when the loops are solved.
+    pub fn followers(&self) -> &[usize] {
+        &self.followers
+    }
+
+    /// How the loop of a subsystem is solved, in words.
+    pub fn way(&self, instances: &[Instance], slot: usize) -> String {
+        let own = self.loops.iter().find(|own| own.members().contains(&slot));
+        own.map(|own| own.way(instances)).unwrap_or_default()
     }
 
     /// Whether there is nothing to solve.
     pub fn is_empty(&self) -> bool {
-        self.links.is_empty()
+        self.loops.is_empty()
     }
 
     /// Keeps states and values at the start of the step; the first trial is made with the values of the start.
     pub fn begin(&mut self, links: &Links, instances: &mut [Instance]) -> Result {
-        let values = |i: &Iterated| {
-            let link = &links.numbers[i.link];
-            (0..link.count()).map(|k| link.value(k)).collect::<Vec<f64>>()
-        };
-        self.start = self.links.iter().flat_map(values).collect();
-        self.guess.clone_from(&self.start);
-        self.scale.clear();
-        self.acceleration.begin();
+        self.loops.iter_mut().for_each(|own| own.begin(links));
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
     }
 
@@ -146,16 +133,18 @@ impl Loops {
         links: &mut Links,
         subsystems: &mut Subsystems,
     ) -> Result<Option<String>> {
-        for _ in 0..MOST {
-            if span.broken.load(Ordering::Relaxed) || self.stands(links, &subsystems.instances)? {
+        let mut repetitions = 0;
+        while repetitions < MOST {
+            if span.broken.load(Ordering::Relaxed) || self.stand(links, &subsystems.instances)? {
                 return Ok(None);
             }
-            if self.runs_away() {
+            if self.loops.iter().any(LoopValues::runs_away) {
                 break;
             }
+            repetitions += 1;
             self.back(&mut subsystems.instances)?;
-            self.set(links, &mut subsystems.instances)?;
-            for level in 0..order.levels() {
+            self.loops.iter().try_for_each(|own| own.set(links, &mut subsystems.instances))?;
+            for level in 0..order.levels_before_loops() {
                 span.level = level as u32;
                 order.pass_on(level, links, &mut subsystems.instances)?;
                 let mut out =
@@ -166,50 +155,32 @@ impl Loops {
                 }
             }
         }
-        let names: Vec<&str> = self.members.iter().map(|slot| subsystems.instances[*slot].name()).collect();
-        Ok(Some(format!("the loop of {} was not solved in {MOST} repetitions", names.join(", "))))
+        Ok(Some(self.unsolved(repetitions, span, links, &subsystems.instances)))
     }
 
-    /// Whether the outputs are those that the trial was made with; if not, a better guess is there.
-    fn stands(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
-        let residual = self.acceleration.residual();
-        residual.clear();
-        let mut stands = true;
-        for own in &self.links {
-            for value in links.numbers[own.link].read(instances)? {
-                let guess = self.guess[residual.len()];
-                stands &= (value - guess).abs() <= TOLERANCE * value.abs().max(guess.abs()).max(1e-3);
-                residual.push(value - guess);
-            }
-        }
-        if self.scale.is_empty() {
-            let sizes = self.guess.iter().zip(&*residual).map(|(u, r)| u.abs().max((u + r).abs()).max(1e-3));
-            self.scale.extend(sizes);
-        }
-        if !stands {
-            self.newton.solve(residual, links, instances)?;
-            let step = self.acceleration.step(&self.guess);
-            self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
-        }
-        Ok(stands)
+    /// A loop that was not solved: its FMUs, its connections, and how far a value is off.
+    #[cold]
+    fn unsolved(&self, repetitions: u32, span: &Span, links: &Links, instances: &[Instance]) -> String {
+        let all = self.loops.iter().map(|own| (own, own.worst(links, instances)));
+        let worst = all.max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
+        let Some((own, (size, value, connections))) = worst else { return String::new() };
+        let names: Vec<&str> = own.members().iter().map(|slot| instances[*slot].name()).collect();
+        format!(
+            "the loop of {} was not solved in {repetitions} repetitions of a step of {} s. Its connections: {}. The value of {value} is off by {size:.3e} \
+             from the one that the step was made with. Ways out: a smaller time.step_s; or {NO_LOOP}",
+            names.join(", "),
+            span.step.h,
+            listed(&connections),
+        )
     }
 
-    /// Whether the guess has left all that start and first trial were of.
-    fn runs_away(&self) -> bool {
-        self.guess.iter().zip(&self.scale).any(|(guess, scale)| guess.abs() > RUNAWAY * scale)
-    }
-
-    /// Sets the inputs to what the guess makes of them.
-    fn set(&self, links: &Links, instances: &mut [Instance]) -> Result {
-        let mut first = 0;
-        for own in &self.links {
-            let link = &links.numbers[own.link];
-            let pairs = self.start[first..].iter().zip(&self.guess[first..]).take(link.count());
-            let values: Vec<f64> = pairs.map(|(start, end)| held(own.takes_end, *start, *end)).collect();
-            link.write(instances, &values)?;
-            first += link.count();
+    /// Whether the outputs are those that the trial was made with; where not, a better guess is there.
+    fn stand(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
+        let mut all = true;
+        for own in &mut self.loops {
+            all &= own.stands(links, instances)?;
         }
-        Ok(())
+        Ok(all)
     }
 }
 
@@ -222,5 +193,14 @@ fn cannot_repeat(instance: &Instance, schedule: &StepSchedule) -> Option<&'stati
         StepSchedule { step_multiple: 2.., .. } => Some("makes steps of another length"),
         _ if !(can(Capabilities::RETRY) && can(Capabilities::STATE)) => Some("cannot save its state"),
         _ => None,
+    }
+}
+
+/// The first of many names, and how many more there are.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    match names.len().saturating_sub(SHOWN) {
+        0 => names.join(", "),
+        more => format!("{} and {more} more", names[..SHOWN].join(", ")),
     }
 }

@@ -8,9 +8,13 @@ use crate::signals::{Link, Links, derivatives};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_numerics::dense::Lu;
+use terraglue_subsystem::Capabilities;
 
 /// A matrix whose smallest pivot is below this share of the largest is not used.
 const SINGULAR: f64 = 1e-9;
+
+/// Most values of loops that are solved with derivatives: the cost of a step grows with their cube.
+const MOST: usize = 300;
 
 /// The linear system of all connections that pass values within a step among the members of a loop.
 #[derive(Debug, Default)]
@@ -33,7 +37,20 @@ impl Newton {
         let others = links.numbers.iter().enumerate().filter(|(_, l)| l.is_within_the_step() && among(l));
         let others: Vec<usize> = others.map(|(k, _)| k).filter(|k| !own.contains(k)).collect();
         own.extend(others);
-        Self { offered: !own.is_empty(), links: own, ..Self::default() }
+        let offered =
+            !own.is_empty() && (own.iter().map(|k| links.numbers[*k].count()).sum::<usize>()) <= MOST;
+        Self { offered, links: own, ..Self::default() }
+    }
+
+    /// How it helps a loop of some members, in words.
+    pub fn way(&self, instances: &[Instance], members: &[usize]) -> String {
+        let lacks = |slot: &&usize| !instances[**slot].capabilities().has(Capabilities::DIRECTIONAL);
+        match members.iter().find(lacks) {
+            _ if self.links.is_empty() => String::new(),
+            Some(slot) => format!("without derivatives, which `{}` does not have", instances[*slot].name()),
+            None if !self.offered => format!("without derivatives, as it has more than {MOST} values"),
+            None => "by Newton's steps with directional derivatives".into(),
+        }
     }
 
     /// Turns the residual of the iterated connections into the step of Newton; leaves it as it is where derivatives are missing.

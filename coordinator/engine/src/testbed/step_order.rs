@@ -1,20 +1,23 @@
 //! The order in which FMUs without glue make their steps.
 //!
-//! An FMU whose outputs depend on its inputs at once (`ModelStructure`) is stepped after the FMUs that feed it, with their outputs at the
-//! end of the step, so that a chain of such FMUs delays no value. FMUs of a loop in which all feed through, FMUs with clocks, subsystems
+//! An FMU with an output that depends on an input at once (`ModelStructure`) is stepped after the FMU that feeds this input, with the value at
+//! the end of the step, so that a chain of such outputs delays no value. Values of a loop of such outputs, FMUs with clocks, subsystems
 //! of another kind and those that make steps of another length keep the order of Jacobi: their inputs are the outputs of the start of the step.
+//! FMUs that take values of loops that are iterated follow when these are solved.
 
 use super::schedule::StepSchedule;
-use crate::signals::{Faults, Links, VariableRef};
+use crate::graph::levels;
+use crate::signals::{ConnectedValue, Faults, FeedThroughs, Links, Place};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_scenario::ModuleKind;
-use terraglue_subsystem::Capabilities;
 
 /// Connections that pass values within a step, by the level of the subsystem that they feed; level 0 has none.
 #[derive(Debug, Default)]
 pub(super) struct StepOrder {
     levels: Vec<Passed>,
+    /// Number of levels that are stepped before loops are solved.
+    before_loops: usize,
 }
 
 /// Numbers of connections.
@@ -29,41 +32,65 @@ impl StepOrder {
     pub fn new(
         links: &mut Links,
         faults: &Faults,
+        feed_through: &FeedThroughs,
         instances: &[Instance],
         schedules: &mut [StepSchedule],
     ) -> Self {
-        let orderly = |slot: usize| {
-            let StepSchedule { glued, step_multiple, .. } = schedules[slot];
-            ModuleKind::is_fmu(instances[slot].module()) && !glued && step_multiple == 1
-        };
-        let follows =
-            |slot: usize| orderly(slot) && instances[slot].capabilities().has(Capabilities::STEP_FEEDTHROUGH);
-        let within = |from: usize, to: usize| from != to && orderly(from) && follows(to);
-        let numbers = links.numbers.iter().enumerate();
-        let numbers: Vec<_> = numbers
-            .filter(|(k, l)| l.is_ordered() && within(l.slots()[0], l.slots()[1]) && !faults.change(*k))
-            .map(|(k, l)| (k, l.slots()))
-            .collect();
-        let discrete = links.discrete.iter().enumerate();
-        let discrete: Vec<_> = discrete
-            .filter(|(_, d)| d.is_ordered())
-            .map(|(k, d)| (k, d.ends().map(VariableRef::slot)))
-            .filter(|(_, [from, to])| within(*from, *to))
-            .collect();
-        let edges: Vec<[usize; 2]> = numbers.iter().chain(&discrete).map(|(_, ends)| *ends).collect();
+        let candidates = candidates(links, faults, instances, schedules);
+        let passed = feed_through.in_one_pass(feed_through.outside_loops(&candidates));
+        let edges: Vec<[usize; 2]> = passed.iter().map(|v| v.ends.map(|(slot, _)| slot)).collect();
         let level = levels(instances.len(), &edges);
         let mut order = Self::default();
         order.levels.resize_with(level.iter().max().map_or(1, |l| l + 1), Passed::default);
-        for (k, [_, to]) in numbers.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {
-            links.numbers[k].pass_within_the_step();
-            order.levels[level[to]].numbers.push(k);
-        }
-        for (k, [_, to]) in discrete.into_iter().filter(|(_, [a, b])| level[*a] < level[*b]) {
-            links.discrete[k].pass_within_the_step();
-            order.levels[level[to]].discrete.push(k);
+        order.before_loops = order.levels.len();
+        for value in passed {
+            let own = &mut order.levels[level[value.ends[1].0]];
+            match value.connection {
+                Place::Number(k) if !links.numbers[k].is_within_the_step() => {
+                    links.numbers[k].pass_within_the_step();
+                    own.numbers.push(k);
+                }
+                Place::Discrete(k) if !links.discrete[k].is_within_the_step() => {
+                    links.discrete[k].pass_within_the_step();
+                    own.discrete.push(k);
+                }
+                _ => {}
+            }
         }
         schedules.iter_mut().zip(&level).for_each(|(schedule, level)| schedule.level = *level as u32);
         order
+    }
+
+    /// Puts FMUs, and all that they are passed, behind the loops; none of the others takes a value of theirs within the step.
+    pub fn put_behind_loops(
+        &mut self,
+        followers: &[usize],
+        links: &Links,
+        instances: &[Instance],
+        schedules: &mut [StepSchedule],
+    ) {
+        let Some(first) = followers.iter().map(|slot| schedules[*slot].level).min() else { return };
+        let before = self.levels.len();
+        let shift = before - first as usize;
+        followers.iter().for_each(|slot| schedules[*slot].level += shift as u32);
+        let last = followers.iter().map(|slot| schedules[*slot].level as usize).max().unwrap_or(before);
+        self.levels.resize_with(last + 1, Passed::default);
+        for level in 0..before {
+            let Passed { numbers, discrete } = std::mem::take(&mut self.levels[level]);
+            for k in numbers {
+                let to = links.numbers[k].slots()[1];
+                self.levels[schedules[to].level as usize].numbers.push(k);
+            }
+            for k in discrete {
+                let to = links.discrete[k].end_ids(instances)[1].0;
+                self.levels[schedules[to].level as usize].discrete.push(k);
+            }
+        }
+    }
+
+    /// Number of levels that are stepped before loops are solved, at least 1.
+    pub fn levels_before_loops(&self) -> usize {
+        self.before_loops.max(1)
     }
 
     /// Number of levels, at least 1.
@@ -86,40 +113,25 @@ impl StepOrder {
     }
 }
 
-/// Length of the longest path of edges to each node; edges within a loop do not count.
-fn levels(count: usize, edges: &[[usize; 2]]) -> Vec<usize> {
-    let mut next = vec![Vec::new(); count];
-    edges.iter().for_each(|[from, to]| next[*from].push(*to));
-    let reach = |start: usize| {
-        let (mut seen, mut open) = (vec![false; count], vec![start]);
-        while let Some(node) = open.pop() {
-            for to in next[node].iter().filter(|to| !std::mem::replace(&mut seen[**to], true)) {
-                open.push(*to);
-            }
-        }
-        seen
+/// Values that may be passed within a step.
+fn candidates(
+    links: &Links,
+    faults: &Faults,
+    instances: &[Instance],
+    schedules: &[StepSchedule],
+) -> Vec<ConnectedValue> {
+    let orderly = |slot: usize| {
+        let StepSchedule { glued, step_multiple, .. } = schedules[slot];
+        ModuleKind::is_fmu(instances[slot].module()) && !glued && step_multiple == 1
     };
-    let reached: Vec<Vec<bool>> = (0..count).map(reach).collect();
-    let plain: Vec<[usize; 2]> = edges.iter().copied().filter(|[a, b]| !reached[*b][*a]).collect();
-    let mut level = vec![0; count];
-    // without loops the longest path has fewer edges than there are nodes
-    for _ in 0..count {
-        for [from, to] in &plain {
-            level[*to] = level[*to].max(level[*from] + 1);
-        }
-    }
-    level
-}
-
-#[cfg(test)]
-mod tests {
-    use super::levels;
-
-    #[test]
-    fn a_chain_is_ordered_and_a_loop_is_not() {
-        assert_eq!(levels(4, &[[3, 1], [1, 0], [3, 0]]), [2, 1, 0, 0]);
-        // 0 and 1 feed each other; 2 comes after both, whatever their order
-        assert_eq!(levels(3, &[[0, 1], [1, 0], [1, 2]]), [0, 0, 1]);
-        assert_eq!(levels(2, &[]), [0, 0]);
-    }
+    let within = |[from, to]: [usize; 2]| from != to && orderly(from) && orderly(to);
+    let numbers = links.numbers.iter().enumerate();
+    let numbers = numbers.filter(|(k, l)| l.is_ordered() && within(l.slots()) && !faults.change(*k));
+    let numbers = numbers.flat_map(|(k, link)| {
+        link.ends().map(move |(ends, _)| ConnectedValue { connection: Place::Number(k), ends })
+    });
+    let discrete = links.discrete.iter().enumerate().filter(|(_, d)| d.is_ordered());
+    let discrete =
+        discrete.map(|(k, d)| ConnectedValue { connection: Place::Discrete(k), ends: d.end_ids(instances) });
+    numbers.chain(discrete.filter(|v| within(v.ends.map(|(slot, _)| slot)))).collect()
 }

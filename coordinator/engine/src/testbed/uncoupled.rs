@@ -10,6 +10,7 @@ use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
 use crate::signals::Links;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -43,6 +44,11 @@ impl Uncoupled {
         &self.order
     }
 
+    /// The loops that are solved.
+    pub fn loops(&self) -> &Loops {
+        &self.loops
+    }
+
     fn pays(&self) -> bool {
         self.workers.threads() > 1 && self.saved.iter().all(|s| *s >= WORTH)
     }
@@ -60,30 +66,45 @@ impl Uncoupled {
             self.loops.begin(links, &mut subsystems.instances)?;
         }
         self.advance_first(clock, &span, subsystems);
-        for level in 1..self.order.levels() {
-            if span.broken.load(Ordering::Relaxed) {
-                break;
-            }
-            span.level = level as u32;
-            self.order.pass_on(level, links, &mut subsystems.instances)?;
-            if is_sampled(clock) {
-                self.sample(&span, subsystems);
-            } else {
-                one_by_one(&span, subsystems);
-            }
-        }
+        let before_loops = self.order.levels_before_loops();
+        self.advance_levels(1..before_loops, clock, &mut span, links, subsystems)?;
         if !self.loops.is_empty() {
             let unsolved = self.loops.solve(&self.order, &mut span, links, subsystems)?;
             if unsolved.is_some() {
                 self.loops.back(&mut subsystems.instances)?;
                 return Ok(unsolved);
             }
+            self.advance_levels(before_loops..self.order.levels(), clock, &mut span, links, subsystems)?;
         }
         let discarded = if span.broken.into_inner() { broken_trial(subsystems)? } else { None };
         if discarded.is_some() {
             self.loops.back(&mut subsystems.instances)?;
         }
         Ok(discarded)
+    }
+
+    /// Trials of those that take outputs of others at the end of the step, level by level.
+    fn advance_levels(
+        &mut self,
+        levels: Range<usize>,
+        clock: &RunClock,
+        span: &mut Span,
+        links: &mut Links,
+        subsystems: &mut Subsystems,
+    ) -> Result {
+        for level in levels {
+            if span.broken.load(Ordering::Relaxed) {
+                break;
+            }
+            span.level = level as u32;
+            self.order.pass_on(level, links, &mut subsystems.instances)?;
+            if is_sampled(clock) {
+                self.sample(span, subsystems);
+            } else {
+                one_by_one(span, subsystems);
+            }
+        }
+        Ok(())
     }
 
     /// Trials of all that take outputs of the start of the step only.

@@ -1,7 +1,7 @@
 //! Values of elements of arrays: FMI reads and sets whole arrays only, so neighbours of one array pass in one call.
 
 use super::{FmuSubsystem, error};
-use terraglue_subsystem::{Result, Values, ValuesMut};
+use terraglue_subsystem::{Error, Result, Values, ValuesMut};
 
 impl FmuSubsystem {
     /// Runs of neighbouring numbers that belong to one array each.
@@ -111,5 +111,50 @@ impl FmuSubsystem {
             Values::Binary(v) => elements!(Binary, v, Vec::new()),
             Values::Enumeration(v) => elements!(Enumeration, v, 0),
         }
+    }
+
+    /// Whether derivatives of all outputs by all inputs are known; adjoint ones alone are asked for scalars only.
+    pub(super) fn knows_directional(&self) -> bool {
+        let c = self.instance.description().capabilities;
+        c.directional_derivatives || c.adjoint_derivatives && self.places.iter().all(|place| place.count == 1)
+    }
+
+    /// Directional derivatives among elements, by those of their whole arrays.
+    pub(super) fn derivatives_of_arrays(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        if !self.instance.description().capabilities.directional_derivatives {
+            return Err(Error::Unsupported);
+        }
+        let (mut v, mut seeds) = (Vec::new(), Vec::new());
+        let mut rest = seed;
+        for run in self.runs(knowns) {
+            let (own, others) = rest.split_at(run.len());
+            rest = others;
+            let (reference, _, count) = self.array(run)?;
+            let first = seeds.len();
+            v.push(reference);
+            seeds.resize(first + count, 0.0);
+            for (id, value) in run.iter().zip(own) {
+                seeds[first + self.place(*id)?.element as usize] = *value;
+            }
+        }
+        let arrays = self.runs(unknowns).map(|run| self.array(run)).collect::<Result<Vec<_>>>()?;
+        let z: Vec<u32> = arrays.iter().map(|(reference, _, _)| *reference).collect();
+        let mut all = vec![f64::NAN; arrays.iter().map(|(_, _, count)| count).sum()];
+        self.instance.directional_derivative(&z, &v, &seeds, &mut all).map_err(error)?;
+        let (mut rest, mut out) = (&all[..], out.iter_mut());
+        for (run, (_, _, count)) in self.runs(unknowns).zip(arrays) {
+            let (whole, others) = rest.split_at(count);
+            rest = others;
+            for (id, out) in run.iter().zip(&mut out) {
+                *out = whole[self.place(*id)?.element as usize];
+            }
+        }
+        Ok(())
     }
 }

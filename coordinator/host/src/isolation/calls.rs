@@ -27,7 +27,7 @@ macro_rules! calls {
 calls! {
     Start, SetPorts, Estimate, Solve, Advance, Jacobian, Commit, Save, Restore, Serialize, Deserialize, Get, Set, Act,
     NextEvent, BodyStates, Energy, Pressure, Shear, Quit, AdvanceBatch, Observe,
-    Answer, Visibility, Overlays,
+    Answer, Visibility, Overlays, Directional,
 }
 
 impl Call {

@@ -9,9 +9,9 @@ use super::{Link, Start};
 use std::cell::{Cell, RefCell};
 use std::time::Instant;
 use terraglue_subsystem::{
-    Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
-    Message, Motion, Overlay, Response, Result, Scene, Step, StreamInfo, Subsystem, Terrain, Values,
-    ValuesMut, Variable, World,
+    Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FeedThrough, FieldInfo, FieldTile,
+    Input, Law, Level, Message, Motion, Overlay, Response, Result, Scene, Step, StreamInfo, Subsystem,
+    Terrain, Values, ValuesMut, Variable, World,
 };
 
 /// An instance in a worker.
@@ -34,6 +34,8 @@ pub struct ModuleInfo {
     pub streams: Vec<StreamInfo>,
     /// Whether it books energies and knows events; a functional mock-up unit does not.
     pub is_module: bool,
+    /// Of a functional mock-up unit only.
+    pub feed_through: Vec<FeedThrough>,
 }
 
 impl ModuleInfo {
@@ -45,10 +47,13 @@ impl ModuleInfo {
         w.put(&self.fields);
         w.put(&self.streams);
         w.put(&self.is_module);
+        if !self.is_module {
+            w.put(&self.feed_through);
+        }
     }
 
     fn take(r: &mut Reader) -> Option<Self> {
-        Some(Self {
+        let mut all = Self {
             capabilities: Capabilities(r.take()?),
             variables: r.take()?,
             actions: r.take()?,
@@ -56,7 +61,12 @@ impl ModuleInfo {
             fields: r.take()?,
             streams: r.take()?,
             is_module: r.take()?,
-        })
+            feed_through: Vec::new(),
+        };
+        if !all.is_module {
+            all.feed_through = r.take()?;
+        }
+        Some(all)
     }
 }
 
@@ -248,6 +258,10 @@ impl Subsystem for Isolated {
         Ok(())
     }
 
+    fn feed_through(&self) -> Vec<FeedThrough> {
+        self.about.feed_through.clone()
+    }
+
     fn streams(&self) -> &[StreamInfo] {
         &self.about.streams
     }
@@ -307,6 +321,27 @@ impl Subsystem for Isolated {
                 calls::put_values(w, &values);
             },
             |_| Some(()),
+        )
+    }
+
+    fn directional_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        if self.about.is_module {
+            return Err(Error::Unsupported);
+        }
+        self.link.borrow_mut().call(
+            Call::Directional,
+            |w| {
+                w.put(unknowns);
+                w.put(knowns);
+                w.put(seed);
+            },
+            |r| r.fill(out),
         )
     }
 

@@ -1,9 +1,9 @@
 //! Calls and answers as bytes in a shared segment. All of them are checked: the memory of a worker may have been overwritten.
 
 use terraglue_subsystem::{
-    Action, BodyRef, BodyState, Causality, Effect, Energy, FieldInfo, Figure, Geometry, JointKind,
-    JointVariables, Law, Material, Node, Overlay, Port, Pose, Ray, RayHit, RayMask, Scene, SceneBody,
-    SceneJoint, SceneShape, ShapeRef, StreamInfo, ValueType, Variable,
+    Action, BodyRef, BodyState, Causality, Effect, Energy, FeedThrough, FieldInfo, Figure, Geometry,
+    JointKind, JointVariables, Law, Material, Node, Overlay, Port, Pose, Ray, RayHit, RayMask, Scene,
+    SceneBody, SceneJoint, SceneShape, ShapeRef, StreamInfo, ValueType, Variable,
 };
 
 /// Bytes that grow up to the end of an area.
@@ -206,6 +206,7 @@ structure!(SceneJoint {
     break_action
 });
 structure!(Scene { bodies, shapes, joints });
+structure!(FeedThrough { outputs, inputs });
 structure!(StreamInfo { name, schema, encoding, rate_hz, most_bytes, help });
 structure!(BodyRef { subsystem, body });
 structure!(ShapeRef { subsystem, body, shape });

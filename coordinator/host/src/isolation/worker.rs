@@ -142,6 +142,7 @@ impl Worker {
                     scene: subsystem.scene(),
                     fields: subsystem.fields().to_vec(),
                     streams: subsystem.streams().to_vec(),
+                    feed_through: subsystem.feed_through(),
                     is_module: self.is_module,
                 };
                 about.put(w);
@@ -241,6 +242,7 @@ impl Worker {
                 subsystem.body_states(&mut states)?;
                 out.write(|w| w.put(&states))
             }
+            Call::Directional => directional(subsystem, r, &mut out),
             Call::Energy => out.write(|w| w.put(&subsystem.energy())),
             Call::Visibility => {
                 let mut shown = vec![true; subsystem.scene().shapes.len()];
@@ -280,6 +282,15 @@ fn advance(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> R
         })
     });
     done.ok_or_else(garbled)?
+}
+
+fn directional(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+    let (unknowns, knowns): (Vec<u32>, Vec<u32>) =
+        (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
+    let seed: Vec<f64> = r.take().ok_or_else(garbled)?;
+    let mut values = vec![f64::NAN; unknowns.len()];
+    subsystem.directional_derivative(&unknowns, &knowns, &seed, &mut values)?;
+    out.write(|w| w.put(values.as_slice()))
 }
 
 fn advance_batch(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {

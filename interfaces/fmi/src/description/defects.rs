@@ -19,6 +19,8 @@ pub enum DefectKind {
     Clock,
     Role,
     Continuous,
+    Derivative,
+    ClockReference,
     Structure,
 }
 
@@ -45,7 +47,7 @@ impl std::fmt::Display for Defect {
 /// Finds defects of one variable.
 type Rule = fn(&ModelDescription, &Variable) -> Option<String>;
 
-const RULES: [(DefectKind, Rule); 11] = [
+const RULES: [(DefectKind, Rule); 13] = [
     (DefectKind::Enumeration, enumeration),
     (DefectKind::Range, range),
     (DefectKind::StartRange, start_range),
@@ -57,6 +59,8 @@ const RULES: [(DefectKind, Rule); 11] = [
     (DefectKind::Clock, clock),
     (DefectKind::Role, role),
     (DefectKind::Continuous, continuous),
+    (DefectKind::Derivative, derivative),
+    (DefectKind::ClockReference, clock_reference),
 ];
 
 impl ModelDescription {
@@ -110,6 +114,17 @@ fn enumeration(_: &ModelDescription, v: &Variable) -> Option<String> {
         .then(|| "is an enumeration without a declared type that lists its items".into())
 }
 
+/// Name of a type in the standards.
+fn type_name(value_type: ValueType) -> String {
+    let text = format!("{value_type:?}");
+    let long = [("I", "Int"), ("U", "UInt"), ("F", "Float")];
+    let renamed = long.iter().find_map(|(short, long)| {
+        let bits = text.strip_prefix(short)?;
+        bits.chars().all(|c| c.is_ascii_digit()).then(|| format!("{long}{bits}"))
+    });
+    renamed.unwrap_or(text)
+}
+
 /// Numbers that a type of whole numbers can hold.
 fn limits(value_type: ValueType) -> Option<(i128, i128)> {
     Some(match value_type {
@@ -125,14 +140,33 @@ fn limits(value_type: ValueType) -> Option<(i128, i128)> {
     })
 }
 
+/// Whether a number of 32 bits is finite where this one is.
+fn holds_single(x: f64) -> bool {
+    !x.is_finite() || (x as f32).is_finite()
+}
+
 fn range(_: &ModelDescription, v: &Variable) -> Option<String> {
-    (v.min > v.max).then(|| format!("has min = {} above max = {}", v.min, v.max))
+    if v.min > v.max {
+        return Some(format!("has min = {} above max = {}", v.min, v.max));
+    }
+    let outside = |bound: f64| match (v.value_type, limits(v.value_type)) {
+        (ValueType::F32, _) => !holds_single(bound),
+        (_, Some((low, high))) => bound.is_finite() && !(low as f64..=high as f64).contains(&bound),
+        _ => false,
+    };
+    let (name, bound) = [("min", v.min), ("max", v.max)].into_iter().find(|(_, bound)| outside(*bound))?;
+    Some(format!("has {name} = {bound}, which {} cannot hold", type_name(v.value_type)))
 }
 
 fn start_range(_: &ModelDescription, v: &Variable) -> Option<String> {
     let bounds = || format!("outside its range from {} to {}", v.min, v.max);
     match &v.start {
         Start::Numbers(numbers) => {
+            let single = v.value_type == ValueType::F32;
+            let large = |x: &&f64| single && !holds_single(**x);
+            if let Some(x) = numbers.iter().find(large) {
+                return Some(format!("has the start value {x:e}, which Float32 cannot hold"));
+            }
             let outside = numbers.iter().find(|x| v.min <= v.max && (**x < v.min || **x > v.max))?;
             Some(format!("has the start value {outside} {}", bounds()))
         }
@@ -140,7 +174,10 @@ fn start_range(_: &ModelDescription, v: &Variable) -> Option<String> {
             if let Some((low, high)) = limits(v.value_type)
                 && let Some(x) = numbers.iter().find(|x| !(low..=high).contains(*x))
             {
-                return Some(format!("has the start value {x}, which {:?} cannot hold", v.value_type));
+                return Some(format!(
+                    "has the start value {x}, which {} cannot hold",
+                    type_name(v.value_type)
+                ));
             }
             if let Some(x) =
                 numbers.iter().find(|x| v.min <= v.max && ((**x as f64) < v.min || **x as f64 > v.max))
@@ -226,6 +263,25 @@ fn continuous(_: &ModelDescription, v: &Variable) -> Option<String> {
         .then(|| format!("is continuous; {:?} changes in steps only", v.value_type))
 }
 
+fn derivative(d: &ModelDescription, v: &Variable) -> Option<String> {
+    let of = v.derivative_of?;
+    let (there, how) = match d.version {
+        Version::V2 => ((1..=d.variables.len()).contains(&(of as usize)), "index"),
+        Version::V3 => (d.variables.iter().any(|other| other.reference == of), "valueReference"),
+    };
+    (!there).then(|| format!("is the derivative of the variable with the {how} {of}, which does not exist"))
+}
+
+fn clock_reference(d: &ModelDescription, v: &Variable) -> Option<String> {
+    let of = |number: u32| d.variables.iter().find(move |other| other.reference == number);
+    let wrong = |number: &u32| of(*number).is_none_or(|other| other.value_type != ValueType::Clock);
+    let number = *v.clocks.iter().find(|number| wrong(number))?;
+    Some(match of(number) {
+        None => format!("belongs to the clock with the valueReference {number}, which does not exist"),
+        Some(other) => format!("belongs to the clock `{}`, which is none", printable(&other.name)),
+    })
+}
+
 /// Outputs and the model structure: each output is listed once, and nothing else.
 fn structure(d: &ModelDescription) -> Vec<Defect> {
     let listed = |k: usize| d.outputs.iter().filter(|u| u.variable == k).count();
@@ -243,9 +299,12 @@ fn structure(d: &ModelDescription) -> Vec<Defect> {
         };
         all.push(of(Some(v.line), format!("`{}` {message}", printable(&v.name))));
     }
-    let independent = d.variables.iter().filter(|v| v.causality == Causality::Independent).count();
-    if d.version == Version::V3 && independent != 1 {
-        all.push(of(None, format!("there are {independent} independent variables, where one is wanted")));
+    let own = |v: &&Variable| v.causality == Causality::Independent && !v.alias;
+    let independent: Vec<&Variable> = d.variables.iter().filter(own).collect();
+    if independent.len() > 1 || d.version == Version::V3 && independent.is_empty() {
+        let line = independent.get(1).map(|second| second.line);
+        let count = independent.len();
+        all.push(of(line, format!("there are {count} independent variables, where one is wanted")));
     }
     all
 }

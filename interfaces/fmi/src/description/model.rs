@@ -257,6 +257,8 @@ pub struct Variable {
     pub triggered: bool,
     /// Clocks by number in calls with which it changes; empty: at any time.
     pub clocks: Vec<u32>,
+    /// The variable of which it is the derivative: its place from 1 in FMI 2, its number in calls in FMI 3.
+    pub derivative_of: Option<u32>,
     /// Whether a structural parameter changed its shape, so that the start values of the description are not for it.
     pub resized: bool,
     /// Whether it can be read, or set where it is an input, at intermediate times.

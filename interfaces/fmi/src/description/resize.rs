@@ -98,6 +98,7 @@ mod tests {
             triggered: false,
             clocks: Vec::new(),
             resized: false,
+            derivative_of: None,
             intermediate: false,
         };
         let array = Variable {

@@ -185,6 +185,8 @@ fn variable(
             && (causality == Causality::Output
                 || causality == Causality::Input && inner.text("intervalVariability") == "triggered"),
         clocks: clocks(element)?,
+        // one that is no number leads nowhere, as a wrong one does
+        derivative_of: inner.attribute("derivative").map(|text| text.trim().parse().unwrap_or(u32::MAX)),
         resized: false,
         intermediate: element.flag("intermediateUpdate")?,
     })

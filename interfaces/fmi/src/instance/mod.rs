@@ -118,7 +118,7 @@ pub struct FmuInstance {
     announced: Vec<u32>,
     /// Whether it was noted that it reports the time of its own solver.
     own_time: Cell<bool>,
-    /// Whether it was noted that it returns early without the flag.
+    /// Whether it was noted that it returns early without the flag, or without being allowed to.
     early: Cell<bool>,
     /// Whether it was noted that it does not report how far it came.
     untold: Cell<bool>,
@@ -481,6 +481,13 @@ fn make_2(
     (made, Some(callbacks))
 }
 
+/// Whether an FMU may leave a step early: only where the event is handled then, and the rest of the step can be made in a step of another
+/// length. Without event mode an FMU handles its events inside the step, unless it may leave it at one.
+fn may_return_early(description: &ModelDescription, event_mode: bool) -> bool {
+    let c = description.capabilities;
+    event_mode && c.variable_step && (c.may_return_early || c.return_early)
+}
+
 /// An instance of FMI 3 with that name, token and folder of resources; `modes`: it logs details, it has event mode.
 fn make_3(
     three: &functions::Three,
@@ -490,11 +497,9 @@ fn make_3(
     announced: &[u32],
     environment: *mut c_void,
 ) -> Option<InstanceHandle> {
-    let c = description.capabilities;
-    let update: Option<functions::Update3> = c.intermediate_update.then_some(update_callback::update);
-    // Only where the event is handled then, and the rest of the step can be made in a step of another length. Without
-    // event mode an FMU handles its events inside the step, unless it may leave it at one.
-    let early = event_mode && c.variable_step && (c.may_return_early || c.return_early);
+    let update: Option<functions::Update3> =
+        description.capabilities.intermediate_update.then_some(update_callback::update);
+    let early = may_return_early(description, event_mode);
     // SAFETY: the arguments are those of the standard and live long enough.
     three.instantiate.map(|f| unsafe {
         f(

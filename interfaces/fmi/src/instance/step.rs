@@ -214,7 +214,12 @@ impl FmuInstance {
         let ended = self.part_end((t, stop), last, early || terminate, tolerance);
         let at_stop = match ended {
             PartEnd::Stop => true,
-            PartEnd::Before => false,
+            PartEnd::Before => {
+                if early && !super::may_return_early(&self.description, self.event_mode) {
+                    not_allowed(self, last, stop);
+                }
+                false
+            }
             PartEnd::Wrong => {
                 let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
                 return Err(self.foreign.lied(NAME, outcome));
@@ -347,6 +352,18 @@ fn own_time(instance: &FmuInstance, last: f64, stop: f64) {
         let text = format!(
             "{DO_STEP_3} reports the time {last} s of its own solver (lastSuccessfulTime) in a step to {stop} s; the step counts \
              as made, and its outputs are those of its solver"
+        );
+        instance.foreign.log.note(&text);
+    }
+}
+
+/// Notes once that the FMU returns early though it was told not to.
+#[cold]
+fn not_allowed(instance: &FmuInstance, last: f64, stop: f64) {
+    if !instance.early.replace(true) {
+        let text = format!(
+            "{DO_STEP_3} returned early at t = {last} s in a step to {stop} s, which was not allowed (earlyReturnAllowed = false); it is \
+             continued from there"
         );
         instance.foreign.log.note(&text);
     }

@@ -1,10 +1,12 @@
-/* FMI 3.0: a source of twelve equal numbers, a sink that counts how often its array is set and how often it sees one that is set in
+/* FMI 3.0: a source of N equal numbers, a sink that counts how often its array is set and how often it sees one that is set in
  * part, and a clock whose solver has a grid of its own (GRID, s). */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#ifndef N
 #define N 12
+#endif
 typedef struct { double a[N], sets, torn, t; } Fmu;
 void *fmi3InstantiateCoSimulation(const char *n, const char *token, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, void *log, void *update) { return calloc(1, sizeof(Fmu)); }

@@ -18,6 +18,8 @@ const NONE: Limit = Limit::Equal(0.0);
 pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = vec![own_grid(place, context)?, tolerance(place, context)?];
     all.extend(arrays(place)?);
+    all.push(array_of_one(place)?);
+    all.push(large_array(place, context)?);
     all.extend(apart(place, context)?);
     all.push(defects(place)?);
     all.push(export(place, context)?);
@@ -27,7 +29,8 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
 
 /// An FMU of FMI 3.0 from the C next to this file.
 fn three(place: &Path, name: &str, variables: &str, outputs: &str, macros: &[&str]) -> Outcome<PathBuf> {
-    let grid = if macros.is_empty() { "" } else { " fixedInternalStepSize=\"0.01\"" };
+    let has_grid = macros.iter().any(|m| m.contains("GRID"));
+    let grid = if has_grid { " fixedInternalStepSize=\"0.01\"" } else { "" };
     let library = place.join(format!("{name}.so"));
     let mut compile = command("cc", &["-O2", "-shared", "-fPIC", "-w", "-o"]);
     must(compile.arg(&library).arg(root().join(SOURCE)).args(macros).arg("-lm"))?;
@@ -157,6 +160,75 @@ fn arrays(place: &Path) -> Outcome<[Figure; 2]> {
     ])
 }
 
+/// A variable with elements, or a scalar where there is none.
+fn numbers(name: &str, reference: u32, causality: &str, count: Option<usize>) -> String {
+    let start = match causality {
+        "input" => format!(" start=\"{}\"", vec!["0"; count.unwrap_or(1)].join(" ")),
+        _ => String::new(),
+    };
+    let sides = count.map(|n| format!("<Dimension start=\"{n}\"/>")).unwrap_or_default();
+    format!(
+        "<Float64 name=\"{name}\" valueReference=\"{reference}\" causality=\"{causality}\"{start}>{sides}</Float64>"
+    )
+}
+
+/// A source and a sink that are connected as wholes.
+fn source_and_sink(
+    place: &Path,
+    name: &str,
+    count: usize,
+    ends: [Option<usize>; 2],
+) -> Outcome<terraglue::Testbed> {
+    let [source, sink] = ["source", "sink"].map(|end| format!("{end}_{name}"));
+    let macros = format!("-DN={count}");
+    let output = "<Output valueReference=\"4\"/>";
+    three(place, &source, &numbers("b", 4, "output", ends[0]), output, &[&macros])?;
+    three(place, &sink, &numbers("a", 1, "input", ends[1]), "", &[&macros])?;
+    built(
+        place,
+        &format!(
+            "[time]\nduration_s = 1.0\n[source]\nfmu = \"{source}.fmu\"\nrollback = false\n[sink]\nfmu = \"{sink}.fmu\"\nrollback = false\n\
+             [[connect]]\nfrom = \"source.b\"\nto = \"sink.a\"\n"
+        ),
+    )
+}
+
+/// Arrays of one element and scalars fit each other.
+fn array_of_one(place: &Path) -> Outcome<Figure> {
+    let mut worst = 0.0;
+    let ways = [("one_scalar", [Some(1), None], "sink.a"), ("scalar_one", [None, Some(1)], "sink.a[1]")];
+    for (name, ends, input) in ways {
+        let mut testbed = source_and_sink(place, name, 1, ends)?;
+        for step in 0..10 {
+            testbed.step().map_err(|e| e.to_string())?;
+            let expected = 0.001 * f64::from(step);
+            worst = larger(worst, (testbed.read(input).unwrap_or(f64::NAN) - expected).abs());
+        }
+    }
+    let what = "an array of one element connected to a scalar and the other way: error of the input, s";
+    Ok(Figure::new("fmi.master.array_of_one", worst, Limit::AtMost(1e-12), what))
+}
+
+/// Cost of a step with an array of 3000 elements that is connected as a whole.
+fn large_array(place: &Path, context: &Context) -> Outcome<Figure> {
+    const ID: &str = "fmi.master.large_array";
+    if !context.timing {
+        return Ok(Figure::skipped(ID, "measured with a clock only"));
+    }
+    let mut cost = Vec::new();
+    for (name, count) in [("few", 12), ("many", 3000)] {
+        let mut testbed = source_and_sink(place, name, count, [Some(count); 2])?;
+        testbed.step().map_err(|e| e.to_string())?;
+        let clock = Instant::now();
+        for _ in 0..500 {
+            testbed.step().map_err(|e| e.to_string())?;
+        }
+        cost.push(clock.elapsed().as_secs_f64());
+    }
+    let what = "what a step costs with a connected array of 3000 elements, over one of 12";
+    Ok(Figure::new(ID, cost[1] / cost[0], Limit::None, what).timed())
+}
+
 /// Rows of a process apart are those of one, and cost little.
 fn apart(place: &Path, context: &Context) -> Outcome<[Figure; 2]> {
     let y = "<Float64 name=\"y\" valueReference=\"5\" causality=\"output\"/>";
@@ -185,7 +257,7 @@ fn apart(place: &Path, context: &Context) -> Outcome<[Figure; 2]> {
 }
 
 /// Descriptions that are wrong in one place each: the words of a variable, and its name.
-const DEFECTS: [(&str, &str); 11] = [
+const DEFECTS: [(&str, &str); 15] = [
     (
         "enumeration",
         "<Enumeration name=\"v\" valueReference=\"1\" causality=\"parameter\" variability=\"fixed\" start=\"1\"/>",
@@ -217,6 +289,10 @@ const DEFECTS: [(&str, &str); 11] = [
         "calculated",
         "<Float64 name=\"v\" valueReference=\"1\" causality=\"local\" initial=\"calculated\" start=\"1\"/>",
     ),
+    ("clocks", "<Float64 name=\"v\" valueReference=\"1\" causality=\"input\" start=\"0\" clocks=\"55\"/>"),
+    ("derivative", "<Float64 name=\"v\" valueReference=\"1\" causality=\"local\" derivative=\"9\"/>"),
+    ("limit", "<Int32 name=\"v\" valueReference=\"1\" causality=\"input\" start=\"0\" max=\"99999999999\"/>"),
+    ("single", "<Float32 name=\"v\" valueReference=\"1\" causality=\"input\" start=\"1e50\"/>"),
     (
         "role",
         "<Float64 name=\"v\" valueReference=\"1\" causality=\"parameter\" variability=\"continuous\" start=\"1\"/>",

@@ -1,4 +1,5 @@
-//! Connections of FMUs against closed forms: the order of a step, loops that are iterated, inputs along a line.
+//! Connections of FMUs against closed forms: the order of a step, loops that are iterated, inputs along a line. Chains and other loops are
+//! measured by `error_over_cost.rs`.
 
 use super::{built, fmus};
 use crate::process::Outcome;
@@ -55,9 +56,8 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             "mass and spring as two FMUs, 10 ms, the loop iterated: amplitude after 2 s against the one of the start, %",
         ),
     ];
-    all.push(chain(folder)?);
+    all.push(beside(folder)?);
     all.extend(newton(folder)?);
-    all.extend(van_der_pol(folder)?);
     Ok(all)
 }
 
@@ -81,9 +81,14 @@ fn off(end: &End) -> f64 {
 
 /// A mass on a spring; `how` of the connections to the spring and to the mass.
 fn oscillate(folder: &Path, mass: &str, step_s: f64, how: [&str; 2]) -> Outcome<End> {
+    oscillate_with(folder, mass, step_s, how, "")
+}
+
+/// The same beside other FMUs.
+fn oscillate_with(folder: &Path, mass: &str, step_s: f64, how: [&str; 2], more: &str) -> Outcome<End> {
     let text = format!(
         "[time]\nstep_s = {step_s}\nduration_s = {END}\n[mass]\nfmu = \"{mass}.fmu\"\n[spring]\nfmu = \"spring.fmu\"\n\
-         [[connect]]\nfrom = \"mass.x\"\nto = \"spring.x\"\n{}[[connect]]\nfrom = \"spring.f\"\nto = \"mass.f\"\n{}",
+         [[connect]]\nfrom = \"mass.x\"\nto = \"spring.x\"\n{}[[connect]]\nfrom = \"spring.f\"\nto = \"mass.f\"\n{}{more}",
         how[0], how[1]
     );
     let mut testbed = built(folder, &text)?;
@@ -95,30 +100,25 @@ fn oscillate(folder: &Path, mass: &str, step_s: f64, how: [&str; 2]) -> Outcome<
     Ok(End { x, amplitude: (x * x + v * v / K).sqrt() })
 }
 
-/// Ten FMUs that double their input at once, behind a clock, with names against the order of the chain.
-fn chain(folder: &Path) -> Outcome<Figure> {
-    const LINKS: usize = 10;
-    fmus::build(folder, "ramp", &[("y", 's', 0.0)], "", "v[0] += h;")?;
-    fmus::build(folder, "double", &[("u", 'i', 0.0), ("y", 'o', 0.0)], "v[1] = 2 * v[0];", "")?;
-    let mut text = "[time]\nstep_s = 0.1\nduration_s = 1.0\n[ramp]\nfmu = \"ramp.fmu\"\n".to_owned();
-    let mut before = "ramp".to_owned();
-    for k in 0..LINKS {
-        let name = format!("link_{:02}", LINKS - k);
-        text += &format!(
-            "[{name}]\nfmu = \"double.fmu\"\n[[connect]]\nfrom = \"{before}.y\"\nto = \"{name}.u\"\n"
-        );
-        before = name;
-    }
-    let mut testbed = built(folder, &text)?;
+/// A mass that also tells its acceleration, which follows the force at once, to a display: the largest change of place and speed by that.
+fn beside(folder: &Path) -> Outcome<Figure> {
+    let mass = [("f", 'i', -K * X0), ("x", 's', X0), ("v", 's', 0.0), ("a", 'o', -K * X0)];
+    let step = "v[1] += h * v[2] + 0.5 * h * h * v[0]; v[2] += h * v[0];";
+    fmus::build(folder, "mass_with_acceleration", &mass, "v[3] = v[0];", step)?;
+    fmus::build(folder, "display", &[("u", 'i', 0.0), ("y", 'o', 0.0)], "v[1] = v[0];", "")?;
     let mut worst = 0.0;
-    for _ in 0..10 {
-        testbed.step().map_err(|e| e.to_string())?;
-        let read = |name: &str| testbed.read(name).unwrap_or(f64::NAN);
-        worst =
-            larger(worst, (read(&format!("{before}.y")) / 2_f64.powi(LINKS as i32) - read("ramp.y")).abs());
+    for how in [["", ""], [JACOBI, JACOBI], [ITERATE, ITERATE], ["", LINE]] {
+        let alone = oscillate(folder, "mass", 0.01, how)?;
+        let display =
+            "[display]\nfmu = \"display.fmu\"\n[[connect]]\nfrom = \"mass.a\"\nto = \"display.u\"\n";
+        for more in ["", display] {
+            let shown = oscillate_with(folder, "mass_with_acceleration", 0.01, how, more)?;
+            worst = larger(worst, (shown.x - alone.x).abs());
+            worst = larger(worst, (shown.amplitude - alone.amplitude).abs());
+        }
     }
-    let what = "ten FMUs with direct feed-through behind each other: how late the last one is, s";
-    Ok(Figure::new("fmi.order.chain", worst, Limit::AtMost(1e-12), what))
+    let what = "mass and spring as two FMUs: change of place and amplitude after 2 s, m, by an acceleration beside them, shown or not";
+    Ok(Figure::new("fmi.order.beside", worst, Limit::Equal(0.0), what))
 }
 
 /// Loops of three FMUs that feed each other at once: how often one of them makes a step, with and without directional derivatives.
@@ -191,76 +191,4 @@ fn steps_of_a_loop(
     let taken = ["b.u", "c.u", "a.u"].map(read);
     let residual = [a, b, c].iter().zip(taken).map(|(y, u)| (y - u).abs()).fold(0.0, larger);
     Ok((read("a.trials") / STEPS, residual))
-}
-
-/// Damping parameter of both oscillators, and the stiffness between them.
-const VAN_DER_POL: [f64; 2] = [1.0, 0.5];
-const VAN_DER_POL_START: [f64; 4] = [2.0, 0.0, -0.5, 1.0];
-
-/// Places and speeds of two coupled oscillators of van der Pol at the end, by the classical rule of Runge and Kutta in steps of 1e-4 s.
-fn at_once() -> [f64; 4] {
-    let [mu, k] = VAN_DER_POL;
-    let rate = |s: [f64; 4]| {
-        let of = |x: f64, v: f64, other: f64| mu * (1.0 - x * x) * v - x + k * (other - x);
-        [s[1], of(s[0], s[1], s[2]), s[3], of(s[2], s[3], s[0])]
-    };
-    let along = |s: [f64; 4], r: [f64; 4], h: f64| std::array::from_fn(|i| s[i] + h * r[i]);
-    let (mut s, h) = (VAN_DER_POL_START, 1e-4);
-    for _ in 0..(END / h).round() as u32 {
-        let a = rate(s);
-        let b = rate(along(s, a, 0.5 * h));
-        let c = rate(along(s, b, 0.5 * h));
-        let d = rate(along(s, c, h));
-        s = std::array::from_fn(|i| s[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
-    }
-    s
-}
-
-/// Two oscillators that feel each other's place: how the error falls with the step.
-fn van_der_pol(folder: &Path) -> Outcome<Vec<Figure>> {
-    let [mu, k] = VAN_DER_POL;
-    let step = format!(
-        "for (int i = 0; i < 100; i++) {{ double g = h / 100, x = v[1], w = v[2]; \
-         double a = {mu:?} * (1 - x * x) * w - x + {k:?} * (v[0] - x); double y = x + 0.5 * g * w, z = w + 0.5 * g * a; \
-         v[1] = x + g * z; v[2] = w + g * ({mu:?} * (1 - y * y) * z - y + {k:?} * (v[0] - y)); }}"
-    );
-    for (name, at) in [("one", 0), ("two", 2)] {
-        let s = VAN_DER_POL_START;
-        fmus::build(
-            folder,
-            name,
-            &[("u", 'i', s[2 - at]), ("x", 's', s[at]), ("v", 's', s[at + 1])],
-            "",
-            &step,
-        )?;
-    }
-    let exact = at_once();
-    let error = |step_s: f64, how: &str| -> Outcome<f64> {
-        let text = format!(
-            "[time]\nstep_s = {step_s}\nduration_s = {END}\n[one]\nfmu = \"one.fmu\"\n[two]\nfmu = \"two.fmu\"\n\
-             [[connect]]\nfrom = \"one.x\"\nto = \"two.u\"\n{how}[[connect]]\nfrom = \"two.x\"\nto = \"one.u\"\n{how}"
-        );
-        let mut testbed = built(folder, &text)?;
-        while testbed.t_s() < END - 0.5 * step_s {
-            testbed.step().map_err(|e| e.to_string())?;
-        }
-        let read = |name: &str| testbed.read(name).unwrap_or(f64::NAN);
-        let ends = [("one.x", 0), ("two.x", 2)];
-        Ok(ends.iter().map(|(name, k)| (read(name) - exact[*k]).abs()).fold(0.0, larger))
-    };
-    let mut all = Vec::new();
-    for (id, how, least) in [("jacobi", JACOBI, 0.9), ("linear", LINE, 1.8), ("iterate", ITERATE, 1.8)] {
-        let (coarse, fine) = (error(0.02, how)?, error(0.01, how)?);
-        let id = format!("fmi.order.van_der_pol.{id}");
-        let what = |what: &str| format!("two coupled oscillators of van der Pol as FMUs, 2 s: {what}");
-        all.push(Figure::new(&id, fine, Limit::None, what("error of the places in steps of 10 ms, m")));
-        let order = (coarse / fine).log2();
-        all.push(Figure::new(
-            format!("{id}.order"),
-            order,
-            Limit::AtLeast(least),
-            what("order of it from 20 ms to 10 ms"),
-        ));
-    }
-    Ok(all)
 }

@@ -337,14 +337,6 @@ impl FmuSubsystem {
         }
     }
 
-    /// Sets values of which some belong to clocks.
-    fn set_one_by_one(&mut self, ids: &[u32], values: Values) -> Result {
-        let Values::F64(values) = values else {
-            return Err(Error::Refused("clocks and what belongs to them is set one by one".into()));
-        };
-        ids.iter().zip(values).try_for_each(|(id, x)| self.set(&[*id], Values::F64(&[*x])))
-    }
-
     /// References of variables that are all scalars; false where one is an element of an array.
     fn collect(&self, ids: &[u32], references: &mut Vec<u32>) -> Result<bool> {
         references.clear();
@@ -370,6 +362,14 @@ fn feeds_through(
     let mut all = unknowns.map(|u| u.dependencies.as_ref().is_none_or(|d| d.iter().any(is_input)));
     let inputs = (0..description.variables.len()).any(|k| is_input(&k));
     inputs && all.any(|depends| depends)
+}
+
+/// Sets values of which some belong to clocks.
+fn set_one_by_one(of: &mut FmuSubsystem, ids: &[u32], values: Values) -> Result {
+    let Values::F64(values) = values else {
+        return Err(Error::Refused("clocks and what belongs to them is set one by one".into()));
+    };
+    ids.iter().zip(values).try_for_each(|(id, x)| of.set(&[*id], Values::F64(&[*x])))
 }
 
 /// An error of an FMU as an error of a subsystem.
@@ -404,7 +404,7 @@ impl Subsystem for FmuSubsystem {
             (self.feeds_through, Capabilities::FEEDTHROUGH),
             (!c.variable_step, Capabilities::FIXED_STEP),
             (derivatives, Capabilities::DERIVATIVES),
-            (self.knows_directional(), Capabilities::DIRECTIONAL),
+            (elements::knows_directional(self), Capabilities::DIRECTIONAL),
             (c.output_derivatives, Capabilities::OUTPUT_DERIVATIVES),
         ];
         let own = all.into_iter().filter(|(has, _)| *has).map(|(_, what)| what);
@@ -517,7 +517,7 @@ impl Subsystem for FmuSubsystem {
         if self.collect(unknowns, &mut z)? && self.collect(knowns, &mut v)? {
             return self.instance.directional_derivative(&z, &v, seed, out).map_err(error);
         }
-        self.derivatives_of_arrays(unknowns, knowns, seed, out)
+        elements::derivatives_of_arrays(self, unknowns, knowns, seed, out)
     }
 
     fn output_derivatives(&self, ids: &[u32], out: &mut [f64]) -> Result {
@@ -605,7 +605,7 @@ impl FmuSubsystem {
             let place = |id: &u32| self.places.get(*id as usize);
             let places: Vec<&ValueLocation> = ids.iter().filter_map(place).collect();
             if places.iter().any(|p| p.clock || p.clocked) && ids.len() > 1 {
-                return self.set_one_by_one(ids, values);
+                return set_one_by_one(self, ids, values);
             }
             if clocks::set(&mut self.instance, &places, &values, error)? {
                 return Ok(());

@@ -112,49 +112,49 @@ impl FmuSubsystem {
             Values::Enumeration(v) => elements!(Enumeration, v, 0),
         }
     }
+}
 
-    /// Whether derivatives of all outputs by all inputs are known; adjoint ones alone are asked for scalars only.
-    pub(super) fn knows_directional(&self) -> bool {
-        let c = self.instance.description().capabilities;
-        c.directional_derivatives || c.adjoint_derivatives && self.places.iter().all(|place| place.count == 1)
-    }
+/// Whether derivatives of all outputs by all inputs are known; adjoint ones alone are asked for scalars only.
+pub(super) fn knows_directional(of: &FmuSubsystem) -> bool {
+    let c = of.instance.description().capabilities;
+    c.directional_derivatives || c.adjoint_derivatives && of.places.iter().all(|place| place.count == 1)
+}
 
-    /// Directional derivatives among elements, by those of their whole arrays.
-    pub(super) fn derivatives_of_arrays(
-        &self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        out: &mut [f64],
-    ) -> Result {
-        if !self.instance.description().capabilities.directional_derivatives {
-            return Err(Error::Unsupported);
-        }
-        let (mut v, mut seeds) = (Vec::new(), Vec::new());
-        let mut rest = seed;
-        for run in self.runs(knowns) {
-            let (own, others) = rest.split_at(run.len());
-            rest = others;
-            let (reference, _, count) = self.array(run)?;
-            let first = seeds.len();
-            v.push(reference);
-            seeds.resize(first + count, 0.0);
-            for (id, value) in run.iter().zip(own) {
-                seeds[first + self.place(*id)?.element as usize] = *value;
-            }
-        }
-        let arrays = self.runs(unknowns).map(|run| self.array(run)).collect::<Result<Vec<_>>>()?;
-        let z: Vec<u32> = arrays.iter().map(|(reference, _, _)| *reference).collect();
-        let mut all = vec![f64::NAN; arrays.iter().map(|(_, _, count)| count).sum()];
-        self.instance.directional_derivative(&z, &v, &seeds, &mut all).map_err(error)?;
-        let (mut rest, mut out) = (&all[..], out.iter_mut());
-        for (run, (_, _, count)) in self.runs(unknowns).zip(arrays) {
-            let (whole, others) = rest.split_at(count);
-            rest = others;
-            for (id, out) in run.iter().zip(&mut out) {
-                *out = whole[self.place(*id)?.element as usize];
-            }
-        }
-        Ok(())
+/// Directional derivatives among elements, by those of their whole arrays.
+pub(super) fn derivatives_of_arrays(
+    of: &FmuSubsystem,
+    unknowns: &[u32],
+    knowns: &[u32],
+    seed: &[f64],
+    out: &mut [f64],
+) -> Result {
+    if !of.instance.description().capabilities.directional_derivatives {
+        return Err(Error::Unsupported);
     }
+    let (mut v, mut seeds) = (Vec::new(), Vec::new());
+    let mut rest = seed;
+    for run in of.runs(knowns) {
+        let (own, others) = rest.split_at(run.len());
+        rest = others;
+        let (reference, _, count) = of.array(run)?;
+        let first = seeds.len();
+        v.push(reference);
+        seeds.resize(first + count, 0.0);
+        for (id, value) in run.iter().zip(own) {
+            seeds[first + of.place(*id)?.element as usize] = *value;
+        }
+    }
+    let arrays = of.runs(unknowns).map(|run| of.array(run)).collect::<Result<Vec<_>>>()?;
+    let z: Vec<u32> = arrays.iter().map(|(reference, _, _)| *reference).collect();
+    let mut all = vec![f64::NAN; arrays.iter().map(|(_, _, count)| count).sum()];
+    of.instance.directional_derivative(&z, &v, &seeds, &mut all).map_err(error)?;
+    let (mut rest, mut out) = (&all[..], out.iter_mut());
+    for (run, (_, _, count)) in of.runs(unknowns).zip(arrays) {
+        let (whole, others) = rest.split_at(count);
+        rest = others;
+        for (id, out) in run.iter().zip(&mut out) {
+            *out = whole[of.place(*id)?.element as usize];
+        }
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use crate::patch::{Patch, Patches};
 use crate::patch_nodes::PatchNodes;
 use crate::vectors::{displacement, dot};
 use crate::wall;
-use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
+use terraglue_soil_law::{KeptNodes, PressureCurve, ShearLaw, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port, Result};
 
 /// Sums over the run and results of the last commit. Part of the committed state.
@@ -391,7 +391,8 @@ impl Scene<'_> {
         state.half = printed.max(before).min(n.spread[k].whole);
         (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
         let part = n.spread[k].part_below(depth, n.bed[k]);
-        state.shear.slip = diluted(n.shear[k].slip, shear.state.slip, [state.part, part]);
+        state.shear.slip =
+            diluted(&self.patches.law(k).shear, n.shear[k].slip, shear.state.slip, [state.part, part]);
         state.part = part;
         state.stamp = ledger.stamp;
         ledger.max_sinkage = ledger
@@ -499,13 +500,16 @@ impl Scene<'_> {
     }
 }
 
-/// Mean slip over the part of a cell that reaches into the bed, m, after a step in which the slip grew from `from` to `to` and that part from
-/// `before` to `now`: soil that the foot comes down on has not been sheared, and loose soil on the bed slides along with the foot.
-fn diluted(from: f64, to: f64, [before, now]: [f64; 2]) -> f64 {
+/// Slip of the part of a cell that reaches into the bed, m, after a step in which it grew from `from` to `to` and that part from `before` to
+/// `now`: soil that the foot comes down on has not been sheared, and loose soil on the bed slides along with the foot.
+fn diluted(law: &ShearLaw, from: f64, to: f64, [before, now]: [f64; 2]) -> f64 {
     if now <= 0.0 {
-        return 0.0;
+        0.0
+    } else if now <= before || from == 0.0 {
+        to
+    } else {
+        law.mean_slip(from, before / now) + (to - from)
     }
-    to - from * (1.0 - before / now).max(0.0)
 }
 
 /// A node that carries nothing any more, of which the underside still reaches below the surface that it met: it stays in its print, where

@@ -146,6 +146,16 @@ impl ShearLaw {
         }
     }
 
+    /// Slip (m) of soil of which a part has slipped by `slip` (m) and the rest has not: that which has mobilised as much, or the mean under laws that
+    /// count the slip themselves.
+    #[inline]
+    pub fn mean_slip(&self, slip: f64, part: f64) -> f64 {
+        match &self.law {
+            StrengthLaw::JanosiHanamoto(law) => law.mean_slip(slip, part),
+            _ => part * slip,
+        }
+    }
+
     /// Stress, tangents and new history after the foot has moved by `s` (m, along t1, t2) under the pressure p.
     ///
     /// On the yield stress the tangent is the elastic one, that of going back. This holds for untouched soil at s = 0, too,

@@ -79,6 +79,25 @@ impl Origin {
         Ok(())
     }
 
+    /// Refuses what is not the same scenario, by its text after all edits.
+    pub fn check_text(&self, now: &Self) -> Result {
+        if self.text == now.text {
+            return Ok(());
+        }
+        let (mut was, mut is) = (self.text.lines(), now.text.lines());
+        let differs = loop {
+            match (was.next(), is.next()) {
+                (Some(a), Some(b)) if a == b => {}
+                (a, b) => break [a, b].map(|line| line.map_or("nothing".into(), |line| format!("`{}`", line.trim()))),
+            }
+        };
+        let message = format!(
+            "the state is one of another scenario: there stands {} where this one has {}",
+            differs[0], differs[1]
+        );
+        Err(refused(message, "build the testbed of the same scenario, with the same edits and the same seed"))
+    }
+
     fn check_inputs(&self, now: &Self) -> Result {
         let key = |line: &String| line.rsplit_once(' ').map_or(line.clone(), |(key, _)| key.to_owned());
         let only = |a: &[String], b: &[String]| a.iter().find(|line| !b.contains(line)).map(key);

@@ -14,7 +14,7 @@ use crate::snapshot::Snapshot;
 use crate::testbed::{LEDGER, as_python, ledger, matrix};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping, PyTuple};
+use pyo3::types::{PyDict, PyMapping, PyTuple, PyWeakrefMethods, PyWeakrefReference};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue::signals::VariableRef;
@@ -22,7 +22,8 @@ use terraglue::signals::VariableRef;
 /// Variables whose values an array follows.
 struct Followed {
     variables: Vec<VariableRef>,
-    array: Py<PyArray2<f64>>,
+    /// It is followed as long as somebody holds it.
+    array: Py<PyWeakrefReference>,
 }
 
 /// Many testbeds of one scenario.
@@ -61,12 +62,13 @@ impl Batch {
         let bound = self.bound.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let mut gone = Vec::new();
         for followed in bound {
-            if followed.array.get_refcnt(py) == 1 {
+            let Some(array) = followed.array.bind(py).upgrade() else {
                 gone.push(followed);
                 continue;
-            }
-            let new = matrix(py, self.members.len(), followed.variables.len(), self.values(py, &followed.variables))?;
-            new.copy_to(followed.array.bind(py))?;
+            };
+            let values = self.values(py, &followed.variables);
+            let new = matrix(py, self.members.len(), followed.variables.len(), values)?;
+            new.copy_to(array.cast::<PyArray2<f64>>()?)?;
         }
         let is_gone = |one: &Arc<Followed>| gone.iter().any(|other| Arc::ptr_eq(one, other));
         self.bound.lock().unwrap_or_else(PoisonError::into_inner).retain(|one| !is_gone(one));
@@ -85,8 +87,9 @@ impl Batch {
         py: Python<'_>,
         work: impl Fn(usize, &mut Member) -> Refused<T> + Sync,
     ) -> PyResult<Vec<T>> {
-        let all: Vec<Refused<T>> = py.detach(|| self.members.map(work));
-        let numbered = all.into_iter().enumerate().map(|(k, one)| one.map_err(|refusal| refusal.of_member(k)));
+        let all: Vec<Refused<T>> = py.detach(|| self.members.map(&work));
+        let numbered =
+            all.into_iter().enumerate().map(|(k, one)| one.map_err(|refusal| refusal.of_member(k)));
         numbered.collect::<Refused<Vec<T>>>().map_err(|refusal| refusal.raise(py))
     }
 
@@ -95,12 +98,17 @@ impl Batch {
         while !py.detach(|| self.members.build()) {
             py.check_signals()?;
         }
-        self.try_each(py, |_, member| member.refusal.take().map_or(Ok(()), |error| Err(error.into()))).map(drop)
+        self.try_each(py, |_, member| member.refusal.take().map_or(Ok(()), |error| Err(error.into())))
+            .map(drop)
     }
 }
 
 /// A value for each of n, from a list of them or one for all.
-fn one_each<'py>(what: &str, given: Option<&Bound<'py, PyAny>>, n: usize) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
+fn one_each<'py>(
+    what: &str,
+    given: Option<&Bound<'py, PyAny>>,
+    n: usize,
+) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
     let Some(given) = given.filter(|given| !given.is_none()) else { return Ok(vec![None; n]) };
     if given.cast::<PyMapping>().is_ok() || !given.hasattr("__len__")? {
         return Ok(vec![Some(given.clone()); n]);
@@ -109,7 +117,10 @@ fn one_each<'py>(what: &str, given: Option<&Bound<'py, PyAny>>, n: usize) -> PyR
     match all.len() == n {
         true => Ok(all),
         false => {
-            let message = format!("{what}: a list of {n} is wanted, one for each testbed, or one for all; not {}", all.len());
+            let message = format!(
+                "{what}: a list of {n} is wanted, one for each testbed, or one for all; not {}",
+                all.len()
+            );
             Err(errors::refused(given.py(), message))
         }
     }
@@ -154,7 +165,8 @@ impl Batch {
     /// Simulated times, s.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let time = |_: usize, member: &mut Member| member.run.as_ref().map_or(f64::NAN, |run| run.testbed.t_s());
+        let time =
+            |_: usize, member: &mut Member| member.run.as_ref().map_or(f64::NAN, |run| run.testbed.t_s());
         py.detach(|| self.members.map(time)).to_pyarray(py)
     }
 
@@ -187,9 +199,13 @@ impl Batch {
     /// Steps all up to a time, s, or each up to one of its own; NaN leaves one where it is.
     fn run_until(&self, py: Python<'_>, t: &Bound<'_, PyAny>) -> PyResult<()> {
         let times: Vec<f64> = match t.extract::<f64>() {
-            Ok(time) if !time.is_finite() => return Err(errors::refused(py, format!("run_until: {time} is no time"))),
+            Ok(time) if !time.is_finite() => {
+                return Err(errors::refused(py, format!("run_until: {time} is no time")));
+            }
             Ok(time) => vec![time; self.members.len()],
-            Err(_) => t.extract().map_err(|_| errors::refused(py, "run_until: a time in s is wanted, or one for each testbed"))?,
+            Err(_) => t.extract().map_err(|_| {
+                errors::refused(py, "run_until: a time in s is wanted, or one for each testbed")
+            })?,
         };
         if times.len() != self.members.len() {
             let message = format!("run_until: {} times are wanted, not {}", self.members.len(), times.len());
@@ -211,7 +227,8 @@ impl Batch {
     fn bind<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let variables = self.find(py, &names)?;
         let array = matrix(py, self.members.len(), variables.len(), self.values(py, &variables))?;
-        let followed = Arc::new(Followed { variables, array: array.clone().unbind() });
+        let weak = PyWeakrefReference::new(array.as_any())?.unbind();
+        let followed = Arc::new(Followed { variables, array: weak });
         self.bound.lock().unwrap_or_else(PoisonError::into_inner).push(followed);
         Ok(array)
     }
@@ -261,10 +278,13 @@ impl Batch {
     ) -> PyResult<()> {
         let which: Vec<usize> = match k.extract::<usize>() {
             Ok(one) => vec![one],
-            Err(_) => k.extract().map_err(|_| errors::refused(py, "restart: the number of a testbed is wanted, or a list of them"))?,
+            Err(_) => k.extract().map_err(|_| {
+                errors::refused(py, "restart: the number of a testbed is wanted, or a list of them")
+            })?,
         };
         if let Some(wrong) = which.iter().find(|k| **k >= self.members.len()) {
-            let message = format!("restart: there is no testbed {wrong}: they are 0 to {}", self.members.len() - 1);
+            let message =
+                format!("restart: there is no testbed {wrong}: they are 0 to {}", self.members.len() - 1);
             return Err(errors::refused(py, message));
         }
         let (seeds, sets) = (one_each("seed", seed, which.len())?, one_each("set", set, which.len())?);
@@ -299,7 +319,8 @@ impl Batch {
 
     /// Ends all runs; the summary of each that was recorded.
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
-        let summaries = self.try_each(py, |_, member| Ok(member.run.take().map(Run::finish).transpose()?.flatten()))?;
+        let summaries =
+            self.try_each(py, |_, member| Ok(member.run.take().map(Run::finish).transpose()?.flatten()))?;
         summaries.into_iter().map(|one| one.map(|summary| as_python(py, &summary)).transpose()).collect()
     }
 

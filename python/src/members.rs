@@ -78,8 +78,7 @@ impl Members {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             given => given,
         };
-        let member =
-            |plan| Mutex::new(Member { plan, run: None, failed: None, refusal: None, wanted: true });
+        let member = |plan| Mutex::new(Member { plan, run: None, failed: None, refusal: None, wanted: true });
         Self { all: plans.into_iter().map(member).collect(), threads, modules }
     }
 
@@ -152,7 +151,11 @@ impl Members {
                 let message = "a batch that is recorded cannot start one again: leave `out` away";
                 return Err(Refusal::Input(message.into()));
             }
-            let edited = member.plan.scenario.edited(edits).map_err(|e| Refusal::Failed(terraglue::Error::Input(e)))?;
+            let edited = member
+                .plan
+                .scenario
+                .edited(edits)
+                .map_err(|e| Refusal::Failed(terraglue::Error::Input(e)))?;
             plans.push((*k, edited));
         }
         for (k, scenario) in plans {

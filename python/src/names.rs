@@ -38,7 +38,9 @@ pub fn values(testbed: &Testbed, variables: &[VariableRef], out: &mut [f64]) {
 pub fn object(testbed: &Testbed, names: &[String], values: &[f64]) -> Refused {
     for (name, value) in names.iter().zip(values).filter(|(_, value)| !value.is_nan()) {
         if value.is_infinite() {
-            return Err(Refusal::Input(format!("`{name}` = {value}: a finite number is wanted, or NaN to leave it as it is")));
+            return Err(Refusal::Input(format!(
+                "`{name}` = {value}: a finite number is wanted, or NaN to leave it as it is"
+            )));
         }
         if let Some(why) = find(testbed, name)?.objection(testbed.instances(), &Value::from(*value)) {
             return Err(Refusal::Input(format!("cannot set `{name}` = {value}: {why}")));
@@ -70,7 +72,8 @@ pub fn set(run: &mut Run, name: &str, value: &Value) -> Refused {
 /// Full names of all actions with their help.
 pub fn actions(testbed: &Testbed) -> Vec<(String, String)> {
     let of = |instance: &terraglue::host::Instance| {
-        let named = instance.actions().iter().map(|a| (format!("{}.{}", instance.name(), a.name), a.help.clone()));
+        let named =
+            instance.actions().iter().map(|a| (format!("{}.{}", instance.name(), a.name), a.help.clone()));
         named.collect::<Vec<_>>()
     };
     testbed.instances().iter().flat_map(of).collect()

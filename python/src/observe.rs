@@ -33,7 +33,9 @@ impl Follower {
     /// Adds a row where it is time for one.
     pub fn look(&mut self, testbed: &Testbed) {
         self.steps += 1;
-        let Some(rows) = self.rows.upgrade().filter(|_| self.steps.is_multiple_of(self.every)) else { return };
+        let Some(rows) = self.rows.upgrade().filter(|_| self.steps.is_multiple_of(self.every)) else {
+            return;
+        };
         let mut rows = locked(&rows);
         rows.t_s.push(testbed.t_s());
         let first = rows.values.len();

@@ -159,7 +159,9 @@ impl Run {
 
     fn may_go_back(&self) -> Refused {
         match self.recorder {
-            Some(_) => Err(Refusal::Input("a testbed that is recorded cannot go back: leave `out` away".into())),
+            Some(_) => {
+                Err(Refusal::Input("a testbed that is recorded cannot go back: leave `out` away".into()))
+            }
             None => Ok(()),
         }
     }

@@ -46,9 +46,9 @@ pub fn edits(set: Option<&Bound<'_, PyAny>>, seed: Option<u64>) -> PyResult<Vec<
             .map_err(|_| errors::refused(set.py(), "set: a dictionary of key paths and values is wanted"))?;
         for item in table.items()?.iter() {
             let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
-            let key: String = key
-                .extract()
-                .map_err(|_| errors::refused(set.py(), format!("set: {key} is no key path: a text is wanted")))?;
+            let key: String = key.extract().map_err(|_| {
+                errors::refused(set.py(), format!("set: {key} is no key path: a text is wanted"))
+            })?;
             all.push((key.clone(), edit(&key, &value)?));
         }
     }
@@ -99,7 +99,9 @@ fn at_level(value: &Bound<'_, PyAny>, level: usize) -> PyResult<Value> {
     let py = value.py();
     let refused = |why: String| Err(errors::refused(py, why));
     if level > DEEPEST {
-        return refused(format!("a value of a scenario has at most {DEEPEST} levels, and does not hold itself"));
+        return refused(format!(
+            "a value of a scenario has at most {DEEPEST} levels, and does not hold itself"
+        ));
     }
     if value.is_none() {
         return Ok(Value::Null);
@@ -111,18 +113,25 @@ fn at_level(value: &Bound<'_, PyAny>, level: usize) -> PyResult<Value> {
         return Ok(Value::Bool(truth.is_true()));
     }
     if value.is_instance_of::<PyInt>() {
-        let number = value.extract::<i64>().map(Value::from).or_else(|_| value.extract::<u64>().map(Value::from));
-        return number.or_else(|_| refused(format!("{value} is no value of a scenario: it has more than 64 bits")));
+        let number =
+            value.extract::<i64>().map(Value::from).or_else(|_| value.extract::<u64>().map(Value::from));
+        return number
+            .or_else(|_| refused(format!("{value} is no value of a scenario: it has more than 64 bits")));
     }
     if value.is_instance_of::<PyFloat>() {
         let number = serde_json::Number::from_f64(value.extract()?).map(Value::Number);
-        return number.map_or_else(|| refused(format!("{value} is no value of a scenario: give a finite number")), Ok);
+        return number
+            .map_or_else(|| refused(format!("{value} is no value of a scenario: give a finite number")), Ok);
     }
     if let Ok(table) = value.cast::<PyMapping>() {
         return table_of(table, level);
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
-        return value.try_iter()?.map(|item| at_level(&item?, level + 1)).collect::<PyResult<Vec<_>>>().map(Value::Array);
+        return value
+            .try_iter()?
+            .map(|item| at_level(&item?, level + 1))
+            .collect::<PyResult<Vec<_>>>()
+            .map(Value::Array);
     }
     if value.hasattr("tolist")? {
         return at_level(&value.call_method0("tolist")?, level + 1);
@@ -138,7 +147,10 @@ fn table_of(table: &Bound<'_, PyMapping>, level: usize) -> PyResult<Value> {
     for item in table.items()?.iter() {
         let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
         let Ok(key) = key.extract::<String>() else {
-            return Err(errors::refused(table.py(), format!("{key} is no key of a scenario: a text is wanted")));
+            return Err(errors::refused(
+                table.py(),
+                format!("{key} is no key of a scenario: a text is wanted"),
+            ));
         };
         all.insert(key, at_level(&value, level + 1)?);
     }
@@ -155,7 +167,9 @@ pub fn task<'py>(
     let loaded = load(scenario, set, None)?;
     let Some(task) = loaded.task else { return Ok(None) };
     let out = PyDict::new(scenario.py());
-    for (key, names) in [("observe", task.observe), ("reward", task.reward), ("cost", task.cost), ("tilt", task.tilt)] {
+    for (key, names) in
+        [("observe", task.observe), ("reward", task.reward), ("cost", task.cost), ("tilt", task.tilt)]
+    {
         out.set_item(key, names)?;
     }
     out.set_item("act", task.act)?;

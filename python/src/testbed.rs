@@ -7,7 +7,9 @@ use crate::run::Run;
 use crate::scenario::{load, module_paths, value_of};
 use crate::snapshot::Snapshot;
 use crate::{errors, names};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict};
@@ -291,7 +293,10 @@ impl Testbed {
                 own.map(|s| s.messages.last().cloned())
             });
             found.ok_or_else(|| {
-                let near = did_you_mean(stream, run.testbed.signals().directory.streams().iter().map(String::as_str));
+                let near = did_you_mean(
+                    stream,
+                    run.testbed.signals().directory.streams().iter().map(String::as_str),
+                );
                 let near = near.map(|near| format!("; {near}")).unwrap_or_default();
                 Refusal::Unknown(format!("there is no stream `{stream}`{near}"))
             })

@@ -88,7 +88,10 @@ impl Origin {
         let differs = loop {
             match (was.next(), is.next()) {
                 (Some(a), Some(b)) if a == b => {}
-                (a, b) => break [a, b].map(|line| line.map_or("nothing".into(), |line| format!("`{}`", line.trim()))),
+                (a, b) => {
+                    break [a, b]
+                        .map(|line| line.map_or("nothing".into(), |line| format!("`{}`", line.trim())));
+                }
             }
         };
         let message = format!(

@@ -52,7 +52,10 @@ impl States {
     /// not take its state.
     pub fn restore(&self, testbed: &mut Testbed, all: &[u8]) -> Result {
         let state: State = bytes::open(FORM, MARK, all).map_err(|_| {
-            let message = format!("these {} bytes are no state of a testbed, damaged, or of another version", all.len());
+            let message = format!(
+                "these {} bytes are no state of a testbed, damaged, or of another version",
+                all.len()
+            );
             let help = "give the bytes as `serialize` has returned them, to the version that made them";
             InputError::plain(message, Some(help.into()))
         })?;

@@ -12,8 +12,11 @@ pub fn read(s: &Section, names: &[&str]) -> Checked<TaskSpec> {
     let observe = variables(s, "observe", names)?;
     let acted = variables(s, "act", names)?;
     let (low, high) = (bounds(s, "low", acted.len())?, bounds(s, "high", acted.len())?);
-    let act: Vec<(String, [f64; 2])> =
-        acted.into_iter().zip(low.into_iter().zip(high)).map(|(name, (low, high))| (name, [low, high])).collect();
+    let act: Vec<(String, [f64; 2])> = acted
+        .into_iter()
+        .zip(low.into_iter().zip(high))
+        .map(|(name, (low, high))| (name, [low, high]))
+        .collect();
     if let Some((name, [low, high])) = act.iter().find(|(_, [low, high])| low >= high) {
         let message = format!("the range of `{name}` is empty: {low} to {high}");
         return Err(s.error("high", message, Some("each entry of `high` is above that of `low`".into())));
@@ -52,7 +55,8 @@ fn variables(s: &Section, key: &str, names: &[&str]) -> Checked<Vec<String>> {
 /// A number for each variable of `act`.
 fn bounds(s: &Section, key: &str, count: usize) -> Checked<Vec<f64>> {
     let value = s.value(key);
-    let all: Vec<f64> = value.as_array().into_iter().flatten().filter_map(serde_json::Value::as_f64).collect();
+    let all: Vec<f64> =
+        value.as_array().into_iter().flatten().filter_map(serde_json::Value::as_f64).collect();
     if all.len() == count && all.iter().all(|x| x.is_finite()) {
         return Ok(all);
     }

@@ -96,7 +96,10 @@ impl Batch {
     /// Builds those that have no run, and raises the first refusal.
     fn build(&self, py: Python<'_>) -> PyResult<()> {
         while !py.detach(|| self.members.build()) {
-            py.check_signals()?;
+            if let Err(signal) = py.check_signals() {
+                py.detach(|| self.members.forget());
+                return Err(signal);
+            }
         }
         self.try_each(py, |_, member| member.refusal.take().map_or(Ok(()), |error| Err(error.into())))
             .map(drop)

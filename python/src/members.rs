@@ -27,7 +27,8 @@ pub struct Member {
     pub failed: Option<String>,
     /// Why it could not be built.
     pub refusal: Option<terraglue::Error>,
-    wanted: bool,
+    /// The scenario that it is to be built of.
+    wanted: Option<Scenario>,
 }
 
 impl Member {
@@ -49,13 +50,14 @@ impl Member {
         true
     }
 
+    /// Builds what is wanted; after a refusal everything is as before.
     fn build(&mut self, modules: &[PathBuf]) {
-        self.wanted = false;
-        // the recording of the one before is closed first
-        let ended = self.run.take().map_or(Ok(None), Run::finish);
-        match ended.and_then(|_| Run::new(self.plan.scenario.clone(), 1, modules, self.plan.out.as_deref())) {
-            Ok(run) => (self.run, self.failed) = (Some(run), None),
-            Err(error) => (self.failed, self.refusal) = (Some(error.to_string()), Some(error)),
+        let Some(scenario) = self.wanted.take() else { return };
+        let built = Run::new(scenario.clone(), 1, modules, self.plan.out.as_deref());
+        let swapped = built.and_then(|run| self.run.replace(run).map_or(Ok(None), Run::finish));
+        match swapped {
+            Ok(_) => (self.plan.scenario, self.failed) = (scenario, None),
+            Err(error) => self.refusal = Some(error),
         }
     }
 }
@@ -78,7 +80,10 @@ impl Members {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             given => given,
         };
-        let member = |plan| Mutex::new(Member { plan, run: None, failed: None, refusal: None, wanted: true });
+        let member = |plan: Plan| {
+            let wanted = Some(plan.scenario.clone());
+            Mutex::new(Member { plan, run: None, failed: None, refusal: None, wanted })
+        };
         Self { all: plans.into_iter().map(member).collect(), threads, modules }
     }
 
@@ -134,12 +139,13 @@ impl Members {
     pub fn build(&self) -> bool {
         let begin = Instant::now();
         let in_time = || begin.elapsed() < SLICE;
-        self.each(in_time, |_, member| {
-            if member.wanted {
-                member.build(&self.modules);
-            }
-        });
-        self.all.iter().all(|member| !locked(member).wanted)
+        self.each(in_time, |_, member| member.build(&self.modules));
+        self.all.iter().all(|member| locked(member).wanted.is_none())
+    }
+
+    /// Builds none of those that are planned.
+    pub fn forget(&self) {
+        self.all.iter().for_each(|member| locked(member).wanted = None);
     }
 
     /// Plans some of them anew, with further edits of their scenarios; after a refusal none.
@@ -159,8 +165,7 @@ impl Members {
             plans.push((*k, edited));
         }
         for (k, scenario) in plans {
-            let mut member = locked(&self.all[k]);
-            (member.plan.scenario, member.wanted) = (scenario, true);
+            locked(&self.all[k]).wanted = Some(scenario);
         }
         Ok(())
     }

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from .frames import GroundSeries
 
-Scenario = Union[str, PathLike[str], Mapping[str, Any]]
-Sets = Mapping[str, Any]
+_Scenario = Union[str, PathLike[str], Mapping[str, Any]]
+_Sets = Mapping[str, Any]
+
+__all__ = ["Testbed", "Batch", "Recording", "Snapshot", "Observation", "task", "version"]
 
 def version() -> str: ...
-def task(scenario: Scenario, *, set: Optional[Sets] = None) -> Optional[dict[str, Any]]: ...
+def task(scenario: _Scenario, *, set: Optional[_Sets] = None) -> Optional[dict[str, Any]]: ...
 @final
 class Snapshot: ...
 
@@ -30,16 +32,16 @@ class Observation:
 
 @final
 class Testbed:
-    def __init__(
-        self,
-        scenario: Scenario,
+    def __new__(
+        cls,
+        scenario: _Scenario,
         *,
-        set: Optional[Sets] = ...,
-        seed: Optional[int] = ...,
-        threads: int = ...,
+        set: Optional[_Sets] = None,
+        seed: Optional[int] = None,
+        threads: int = 1,
         module_path: Sequence[str] = ...,
-        out: Optional[Union[str, PathLike[str]]] = ...,
-    ) -> None: ...
+        out: Optional[Union[str, PathLike[str]]] = None,
+    ) -> Testbed: ...
     @property
     def t(self) -> float: ...
     @property
@@ -61,9 +63,9 @@ class Testbed:
     def read(self, names: Sequence[str]) -> NDArray[np.float64]: ...
     def write(self, names: Sequence[str], values: NDArray[np.float64]) -> None: ...
     def drive(self, inputs: Sequence[str], values: NDArray[np.float64], outputs: Sequence[str]) -> NDArray[np.float64]: ...
-    def __getitem__(self, name: str) -> float: ...
-    def __setitem__(self, name: str, value: Any) -> None: ...
-    def __contains__(self, name: str) -> bool: ...
+    def __getitem__(self, key: str, /) -> float: ...
+    def __setitem__(self, key: str, value: Any, /) -> None: ...
+    def __contains__(self, key: str, /) -> bool: ...
     def act(self, action: str, **arguments: Any) -> None: ...
     def snapshot(self) -> Snapshot: ...
     def restore(self, snapshot: Snapshot) -> None: ...
@@ -79,17 +81,17 @@ class Testbed:
 
 @final
 class Batch:
-    def __init__(
-        self,
-        scenario: Scenario,
+    def __new__(
+        cls,
+        scenario: _Scenario,
         n: int,
         *,
-        seeds: Optional[Sequence[int]] = ...,
-        set: Optional[Union[Sets, Sequence[Sets]]] = ...,
-        threads: int = ...,
+        seeds: Optional[Sequence[int]] = None,
+        set: Optional[Union[_Sets, Sequence[_Sets]]] = None,
+        threads: int = 0,
         module_path: Sequence[str] = ...,
-        out: Optional[Union[str, PathLike[str]]] = ...,
-    ) -> None: ...
+        out: Optional[Union[str, PathLike[str]]] = None,
+    ) -> Batch: ...
     def __len__(self) -> int: ...
     @property
     def t(self) -> NDArray[np.float64]: ...
@@ -110,7 +112,7 @@ class Batch:
         k: Union[int, Sequence[int]],
         *,
         seed: Optional[Union[int, Sequence[int]]] = None,
-        set: Optional[Union[Sets, Sequence[Sets]]] = None,
+        set: Optional[Union[_Sets, Sequence[_Sets]]] = None,
     ) -> None: ...
     def finish(self) -> list[Optional[dict[str, Any]]]: ...
     def __enter__(self) -> Batch: ...
@@ -118,7 +120,7 @@ class Batch:
 
 @final
 class Recording:
-    def __init__(self, folder: Union[str, PathLike[str]]) -> None: ...
+    def __new__(cls, folder: Union[str, PathLike[str]]) -> Recording: ...
     @property
     def names(self) -> list[str]: ...
     @property

@@ -194,13 +194,16 @@ class VectorEnvironment(VectorEnv):
         values[over] = np.nan
         batch.write(self._actions, values)
         batch.run_until(np.where(over, np.nan, batch.t + task.period_s))
-        rewards, fallen, ended, infos = self._judged(over)
+        rewards, fallen, ended, own = self._judged(over)
         self._over = fallen | ended
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
-            infos = self._keep_final(infos)
-            infos = self._merged(infos, self._start(np.flatnonzero(self._over)))
-        elif over.any():
-            infos = self._merged(infos, self._start(np.flatnonzero(over)))
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            observed = self._observed()
+            own = {k: {"final_obs": observed[k], "final_info": info} if self._over[k] else info for k, info in own.items()}
+            over = self._over.copy()
+        infos = {}
+        for k, info in own.items():
+            infos = self._add_info(infos, info, k)
+        infos = self._start(np.flatnonzero(over), infos=infos) if over.any() else infos
         return self._observed(), rewards, fallen, ended, infos
 
     def close_extras(self, **kwargs):
@@ -218,26 +221,13 @@ class VectorEnvironment(VectorEnv):
         fallen = (stopped | tilted) & ~resting
         ended = (batch.t >= task.duration_s - 0.5 * self._step_s) & ~fallen & ~resting
         rewards = np.where(fallen, -1.0, np.where(ended, gain / np.maximum(cost, 1e-9), 0.0))
-        infos = {}
-        for k in np.flatnonzero(~resting):
-            own = {"gain": gain[k], "cost": cost[k], **({"error": failed[k]} if k in failed else {})}
-            infos = self._add_info(infos, own, int(k))
-        return rewards, fallen, ended, infos
+        own = {k: {"gain": gain[k], "cost": cost[k]} for k in np.flatnonzero(~resting).tolist()}
+        for k in own.keys() & failed.keys():
+            own[k]["error"] = failed[k]
+        return rewards, fallen, ended, own
 
-    def _keep_final(self, infos):
-        observed = self._observed()
-        for k in np.flatnonzero(self._over).tolist():
-            own = {key: values[k] for key, values in infos.items() if not key.startswith(("_", "final")) and infos[f"_{key}"][k]}
-            infos = self._add_info(infos, {"final_obs": observed[k], "final_info": own}, k)
-        return infos
-
-    def _merged(self, infos, others):
-        for key, values in others.items():
-            infos[key] = values
-        return infos
-
-    def _start(self, which, seeds=None):
-        """Starts some of them again; their information."""
+    def _start(self, which, seeds=None, infos=None):
+        """Starts some of them again; `infos` with theirs."""
         own = []
         for k in which:
             if seeds is not None and seeds[k] is not None:
@@ -254,7 +244,7 @@ class VectorEnvironment(VectorEnv):
         else:
             self._batch.restart(which.tolist(), seed=own)
         self._begun[which], self._over[which] = self._counted()[which], False
-        infos = {}
+        infos = {} if infos is None else infos
         for k, seed in zip(which.tolist(), own):
             infos = self._add_info(infos, {"seed": seed}, k)
         return infos

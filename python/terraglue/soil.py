@@ -89,7 +89,7 @@ class Soil:
             if len(orientation) != steps:
                 raise InputError(f"orientation: {steps} steps are wanted, as of position, not {len(orientation)}")
             orientation = self._unit(orientation)
-        poses = np.concatenate([position.reshape(steps, -1), orientation.reshape(steps, -1)], axis=1)
+        poses = np.concatenate([position.reshape(steps, 3 * self.count), orientation.reshape(steps, 4 * self.count)], axis=1)
         wrenches = self.testbed.drive(self._pose, np.ascontiguousarray(poses), self._wrench)
         if steps:
             self._orientation = np.array(orientation[-1])

@@ -93,7 +93,7 @@ def test_the_jacobian_of_the_wrench_is_that_of_small_motions(tg):
     for _ in range(10):
         place[:, 2] -= 2e-4
         soil.step(place)
-    deeper, tilted = place - [0.0, 0.0, 1e-4], turned(level, np.array([2e-3, 3e-3, 0.0]))
+    deeper, tilted = place - [0.0, 0.0, 1e-4], turned(level, np.array([5e-4, 3e-4, 0.0]))
     jacobian = soil.jacobian(deeper, tilted)
     assert jacobian.shape == (2, 6, 6)
     # deeper pushes more, a tilt is pushed back
@@ -122,7 +122,12 @@ def test_a_box_in_mujoco_stands_with_moments_and_turns_over_without(tg):
     assert without.max() > 10 * tilt.max()
 
 
-def test_a_search_finds_a_gait_that_needs_less_energy(tg):
+def test_a_search_for_a_gait_returns_what_it_has_measured(tg):
     pytest.importorskip("scipy", reason="scipy is not installed: pip install scipy")
     gait = example("gait_for_energy")
-    assert gait.cost([[0.15, 0.1], [0.05, 0.05]], until_s=0.5, set={"gait.stand_s": 0.0, "gait.ramp_s": 0.1}).shape == (2,)
+    # the search itself takes minutes: here a piece of it, with short walks
+    short = {"until_s": 0.4, "set": {"gait.stand_s": 0.0, "gait.ramp_s": 0.1, "terrain.size_m": [3.0, 1.6], "terrain.spacing_m": 0.02}}
+    first = gait.cost([[0.15, 0.1], [0.05, 0.05]], **short)
+    assert first.shape == (2,) and np.isfinite(first).all()
+    best, lowest = gait.search(generations=1, population=3, **short)
+    assert lowest == gait.cost(best[:, None], **short)[0]

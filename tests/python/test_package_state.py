@@ -52,7 +52,7 @@ def test_a_state_of_something_else_is_refused(tg, tmp_path):
     for edit, seed, words in others:
         other = tg.Testbed(PLATE, set=edit, seed=seed)
         before = other.read(other.names)
-        with pytest.raises(tg.InputError, match=f"another scenario.*{words}"):
+        with pytest.raises(tg.InputError, match=f"another scenario: `.*{words}"):
             other.deserialize(state)
         assert np.array_equal(other.read(other.names), before, equal_nan=True) and other.t == 0.0
     changed = bytearray(state)

@@ -79,25 +79,13 @@ impl Origin {
         Ok(())
     }
 
-    /// Refuses what is not the same scenario, by its text after all edits.
-    pub fn check_text(&self, now: &Self) -> Result {
-        if self.text == now.text {
-            return Ok(());
-        }
-        let (mut was, mut is) = (self.text.lines(), now.text.lines());
-        let differs = loop {
-            match (was.next(), is.next()) {
-                (Some(a), Some(b)) if a == b => {}
-                (a, b) => {
-                    break [a, b]
-                        .map(|line| line.map_or("nothing".into(), |line| format!("`{}`", line.trim())));
-                }
-            }
+    /// Refuses another scenario, after all edits.
+    pub fn check_scenario(&self, now: &Self) -> Result {
+        let differs = match terraglue_scenario::differences(&self.text, &now.text) {
+            Some(all) if all.is_empty() => return Ok(()),
+            all => all.and_then(|all| all.first().map(|one| format!(": {one}"))).unwrap_or_default(),
         };
-        let message = format!(
-            "the state is one of another scenario: there stands {} where this one has {}",
-            differs[0], differs[1]
-        );
+        let message = format!("the state is one of another scenario{differs}");
         Err(refused(message, "build the testbed of the same scenario, with the same edits and the same seed"))
     }
 

@@ -59,7 +59,7 @@ impl States {
             let help = "give the bytes as `serialize` has returned them, to the version that made them";
             InputError::plain(message, Some(help.into()))
         })?;
-        state.origin.check_text(&self.origin)?;
+        state.origin.check_scenario(&self.origin)?;
         state.origin.check(&self.scenario, &self.options)?;
         testbed.deserialize(&state.testbed.0)
     }

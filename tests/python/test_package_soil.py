@@ -113,13 +113,13 @@ def example(name):
     return module
 
 
-def test_a_box_in_mujoco_stands_with_moments_and_turns_over_without(tg):
+def test_a_post_in_mujoco_stands_with_moments_and_falls_without(tg):
     pytest.importorskip("mujoco", reason="mujoco is not installed: pip install mujoco")
     run = example("soil_in_mujoco").run
-    tilt, height = run(True, 0.6).T
-    assert tilt.max() < 0.05 and tilt[-1] < 0.02 and 0.03 < height[-1] < 0.05
-    without, _ = run(False, 0.6).T
-    assert without.max() > 10 * tilt.max()
+    tilt, height = run(True).T
+    assert len(tilt) == 1500 and tilt.max() < 5e-3 and tilt[-1] < tilt.max() and 0.02 < height[-1] < 0.03
+    fallen, _ = run(False).T
+    assert fallen[-1] > 1.2 and len(fallen) < 1500
 
 
 def test_a_search_for_a_gait_returns_what_it_has_measured(tg):

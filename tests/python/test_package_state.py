@@ -132,7 +132,8 @@ def test_values_that_are_none_of_a_scenario_are_refused(tg):
     testbed, name = tg.Testbed(PLATE), "bevameter.small_press.velocity_target"
     endless = []
     endless.append(endless)
-    for value, words in ((float("nan"), "finite"), (float("inf"), "finite"), (2**70, "64 bits"), (object(), "type object"), ({1: 2}, "no key"), (endless, "levels")):
+    wrong = [(float("nan"), "finite"), (float("inf"), "finite"), (2**70, "64 bits"), (object(), "type object"), ({1: 2}, "no key"), (endless, "levels")]
+    for value, words in wrong:
         with pytest.raises(tg.InputError, match=words):
             testbed[name] = value
         with pytest.raises(tg.InputError, match=words):

@@ -77,7 +77,7 @@ impl Batch {
 
     /// Finds variables; all testbeds have the same.
     fn find(&self, py: Python<'_>, names: &[String]) -> PyResult<Vec<VariableRef>> {
-        let found = py.detach(|| self.members.first(|run| names::find_all(&run.testbed, names)));
+        let found = py.detach(|| self.members.first(|run| names::find_all(run, names)));
         found.unwrap_or(Err(Refusal::Ended("the batch"))).map_err(|refusal| refusal.raise(py))
     }
 
@@ -246,7 +246,7 @@ impl Batch {
         }
         let rows: Vec<Vec<f64>> = values.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
         let object = |k: usize, member: &mut Member| {
-            member.alive().map_or(Ok(()), |run| names::object(&run.testbed, &names, &rows[k]))
+            member.alive().map_or(Ok(()), |run| names::object(run, &names, &rows[k]))
         };
         self.try_each(py, object)?;
         let write = |k: usize, member: &mut Member| {

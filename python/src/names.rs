@@ -9,22 +9,22 @@ use terraglue::signals::VariableRef;
 use terraglue::subsystem::Variable;
 
 /// Finds a variable.
-pub fn find(testbed: &Testbed, name: &str) -> Refused<VariableRef> {
-    let directory = &testbed.signals().directory;
-    directory.find(name).ok_or_else(|| {
+pub fn find(run: &Run, name: &str) -> Refused<VariableRef> {
+    run.variables.get(name).copied().ok_or_else(|| {
+        let directory = &run.testbed.signals().directory;
         let hint = directory.hint(name).map(|hint| format!("; {hint}")).unwrap_or_default();
         Refusal::Unknown(format!("there is no variable `{name}`{hint}"))
     })
 }
 
 /// Finds several.
-pub fn find_all(testbed: &Testbed, names: &[String]) -> Refused<Vec<VariableRef>> {
-    names.iter().map(|name| find(testbed, name)).collect()
+pub fn find_all(run: &Run, names: &[String]) -> Refused<Vec<VariableRef>> {
+    names.iter().map(|name| find(run, name)).collect()
 }
 
 /// Description of a variable.
-pub fn describe<'a>(testbed: &'a Testbed, name: &str) -> Refused<&'a Variable> {
-    Ok(find(testbed, name)?.describe(testbed.instances()))
+pub fn describe<'a>(run: &'a Run, name: &str) -> Refused<&'a Variable> {
+    Ok(find(run, name)?.describe(run.testbed.instances()))
 }
 
 /// Committed values as numbers; NaN where a variable is none.
@@ -35,14 +35,14 @@ pub fn values(testbed: &Testbed, variables: &[VariableRef], out: &mut [f64]) {
 }
 
 /// Why some of the numbers could not be set, if so; NaN is none.
-pub fn object(testbed: &Testbed, names: &[String], values: &[f64]) -> Refused {
+pub fn object(run: &Run, names: &[String], values: &[f64]) -> Refused {
     for (name, value) in names.iter().zip(values).filter(|(_, value)| !value.is_nan()) {
         if value.is_infinite() {
             return Err(Refusal::Input(format!(
                 "`{name}` = {value}: a finite number is wanted, or NaN to leave it as it is"
             )));
         }
-        if let Some(why) = find(testbed, name)?.objection(testbed.instances(), &Value::from(*value)) {
+        if let Some(why) = find(run, name)?.objection(run.testbed.instances(), &Value::from(*value)) {
             return Err(Refusal::Input(format!("cannot set `{name}` = {value}: {why}")));
         }
     }
@@ -54,15 +54,15 @@ pub fn write(run: &mut Run, names: &[String], values: &[f64]) -> Refused {
     if names.len() != values.len() {
         return Err(Refusal::Input(format!("write: {} numbers are wanted, one for each name", names.len())));
     }
-    find_all(&run.testbed, names)?;
-    object(&run.testbed, names, values)?;
+    find_all(run, names)?;
+    object(run, names, values)?;
     let given = names.iter().zip(values).filter(|(_, value)| !value.is_nan());
     given.into_iter().try_for_each(|(name, value)| set(run, name, &Value::from(*value)))
 }
 
 /// Sets a variable.
 pub fn set(run: &mut Run, name: &str, value: &Value) -> Refused {
-    find(&run.testbed, name)?;
+    find(run, name)?;
     run.testbed.set(name, value).map_err(|error| match error {
         terraglue::Error::Simulation { message, .. } => Refusal::Input(message),
         other => Refusal::Failed(other),

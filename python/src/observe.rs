@@ -1,5 +1,6 @@
 //! `Observation`: values at every communication point of a testbed that goes on in long stretches.
 
+use crate::run::Run;
 use crate::testbed::matrix;
 use crate::{errors, names};
 use numpy::{PyArray1, PyArray2, ToPyArray};
@@ -57,13 +58,13 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Begins one.
-pub fn begin(testbed: &Testbed, names: Vec<String>, every: u64) -> errors::Refused<(Observation, Follower)> {
+pub fn begin(run: &Run, names: Vec<String>, every: u64) -> errors::Refused<(Observation, Follower)> {
     if every == 0 {
         let message = "observe: every = 0: a number of steps from 1 on is wanted";
         return Err(errors::Refusal::Input(message.into()));
     }
-    let variables = names::find_all(testbed, &names)?;
-    let units = variables.iter().map(|v| v.describe(testbed.instances()).unit.clone()).collect();
+    let variables = names::find_all(run, &names)?;
+    let units = variables.iter().map(|v| v.describe(run.testbed.instances()).unit.clone()).collect();
     let rows = Arc::new(Mutex::new(Rows::default()));
     let follower = Follower { variables, every, steps: 0, rows: Arc::downgrade(&rows) };
     Ok((Observation { names, units, rows }, follower))

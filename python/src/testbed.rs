@@ -114,12 +114,12 @@ impl Testbed {
 
     /// Unit of a variable.
     fn unit(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        self.with(py, |run| Ok(names::describe(&run.testbed, name)?.unit.clone()))
+        self.with(py, |run| Ok(names::describe(run, name)?.unit.clone()))
     }
 
     /// Units of variables.
     fn units(&self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<String>> {
-        let unit = |run: &Run, name: &String| Ok(names::describe(&run.testbed, name)?.unit.clone());
+        let unit = |run: &Run, name: &String| Ok(names::describe(run, name)?.unit.clone());
         self.with(py, |run| names.iter().map(|name| unit(run, name)).collect())
     }
 
@@ -136,7 +136,7 @@ impl Testbed {
     #[pyo3(signature = (names, *, every=1))]
     fn observe(&self, py: Python<'_>, names: Vec<String>, every: u64) -> PyResult<Observation> {
         self.with(py, |run| {
-            let (observation, follower) = observe::begin(&run.testbed, names, every)?;
+            let (observation, follower) = observe::begin(run, names, every)?;
             run.followers.push(follower);
             Ok(observation)
         })
@@ -144,7 +144,7 @@ impl Testbed {
 
     /// Meaning of a variable.
     fn help(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        self.with(py, |run| Ok(names::describe(&run.testbed, name)?.help.clone()))
+        self.with(py, |run| Ok(names::describe(run, name)?.help.clone()))
     }
 
     /// Makes n communication steps; of several threads each makes its own.
@@ -168,7 +168,7 @@ impl Testbed {
     /// Committed values of variables, in their units.
     fn read<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let values = self.with(py, |run| {
-            let variables = names::find_all(&run.testbed, &names)?;
+            let variables = names::find_all(run, &names)?;
             let mut out = vec![0.0; variables.len()];
             names::values(&run.testbed, &variables, &mut out);
             Ok(out)
@@ -196,7 +196,7 @@ impl Testbed {
             return Err(errors::refused(py, message));
         }
         let all: Vec<f64> = values.as_array().iter().copied().collect();
-        let found = self.with(py, |run| names::find_all(&run.testbed, &outputs))?;
+        let found = self.with(py, |run| names::find_all(run, &outputs))?;
         let mut out = vec![f64::NAN; rows * found.len()];
         let mut next = 0;
         self.in_slices(py, |run| {
@@ -214,7 +214,7 @@ impl Testbed {
 
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<f64> {
         self.with(py, |run| {
-            let variable = names::find(&run.testbed, name)?;
+            let variable = names::find(run, name)?;
             let none = || Refusal::Input(format!("`{name}` is no number, or its subsystem has none now"));
             variable.number(run.testbed.instances()).map_err(|_| none())
         })
@@ -226,7 +226,7 @@ impl Testbed {
     }
 
     fn __contains__(&self, py: Python<'_>, name: &str) -> PyResult<bool> {
-        self.with(py, |run| Ok(run.testbed.signals().directory.find(name).is_some()))
+        self.with(py, |run| Ok(run.variables.contains_key(name)))
     }
 
     /// Does one of `actions`, `subsystem.action`, with arguments where its module takes some.

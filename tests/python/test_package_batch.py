@@ -150,10 +150,17 @@ def test_one_that_fails_in_the_middle_is_listed_and_can_be_started_again(tg, tmp
     scenario = {"time": {"step_s": 0.01, "duration_s": 1.0}, "breaks": {"module": str(tmp_path / "breaks.py")}}
     batch = tg.Batch(scenario, 3, set=[{}, {"breaks.at_s": 0.105}, {}])
     live = batch.bind(["breaks.z"])
+    batch.run_until(0.05)
+    kept = batch.snapshot()
     batch.run_until(0.2)
     assert list(batch.failed) == [1] and "it broke" in batch.failed[1] and "t = 0.11" in batch.failed[1]
     assert np.isnan(live[1, 0]) and live[[0, 2], 0] == pytest.approx([0.2, 0.2]) and batch.t == pytest.approx([0.2, 0.11, 0.2])
     assert np.isnan(batch.energy()["kinetic"]).tolist() == [False, True, False] and batch.snapshot()[1] is None
+    # a state of before is gone back to, and fails again
+    batch.restore([None, kept[1], None])
+    assert not batch.failed and live[1, 0] == pytest.approx(0.05)
+    batch.run_until(0.2)
+    assert list(batch.failed) == [1]
     batch.step()
     batch.restart(1, set={"breaks.at_s": 5.0})
     assert not batch.failed and batch.t == pytest.approx([0.21, 0.0, 0.21])

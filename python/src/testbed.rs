@@ -123,7 +123,7 @@ impl Testbed {
         self.with(py, |run| names.iter().map(|name| unit(run, name)).collect())
     }
 
-    /// What `act` does: help by full name.
+    /// All actions of `act`: help by full name.
     #[getter]
     fn actions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let out = PyDict::new(py);

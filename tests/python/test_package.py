@@ -14,7 +14,8 @@ import time
 
 import numpy as np
 import pytest
-from conftest import PLATE, PROGRAM, ROOT, wheel
+from conftest import PLATE, ROOT
+
 
 def sha(path):
     return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()

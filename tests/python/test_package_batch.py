@@ -1,5 +1,6 @@
 """Batches of the Python package: bits of single runs, errors and signals in the middle, starting again, recordings."""
 
+import collections.abc
 import os
 import signal
 import subprocess
@@ -170,6 +171,37 @@ def test_one_that_fails_in_the_middle_is_listed_and_can_be_started_again(tg, tmp
     with pytest.raises(tg.InputError, match="at_s"):
         batch.restart(2, set={"breaks.at_s": "soon"})
     assert not batch.failed and batch.t == pytest.approx([0.21] * 3)
+
+
+class Raises(collections.abc.Mapping):
+    """A dictionary that fails where it is read."""
+
+    def __getitem__(self, key):
+        raise RuntimeError("no entry")
+
+    def __iter__(self):
+        return iter(["time.duration_s"])
+
+    def __len__(self):
+        return 1
+
+
+def test_an_exception_in_an_edit_comes_out_and_leaves_everything_as_it_was(tg):
+    batch = tg.Batch(PLATE, 2)
+    batch.step(5)
+    for wrong, error, words in (
+        (Raises(), RuntimeError, "no entry"),
+        ([{}, {"soil.parameters": object()}], tg.InputError, "type object"),
+        ([{}, 3], tg.InputError, "dictionary"),
+        ([{}, {"soil.parameters": "LETE_sandd"}], tg.InputError, "LETE_sand"),
+    ):
+        with pytest.raises(error, match=words):
+            batch.restart([0, 1], set=wrong)
+        with pytest.raises(error, match=words):
+            tg.Batch(PLATE, 2, set=wrong)
+    assert batch.t == pytest.approx([0.005] * 2) and not batch.failed
+    batch.step()
+    assert batch.t == pytest.approx([0.006] * 2)
 
 
 def test_those_that_start_again_have_the_bits_of_a_new_testbed(tg):

@@ -2,121 +2,129 @@
 //!
 //! Each testbed is stepped by one thread at a time and shares nothing with the others, so its bits are those of a testbed alone, whatever the
 //! number of threads. One that fails is listed while the others go on; its values are NaN.
+//!
+//! The lock of a testbed is taken without the interpreter's, and nothing of Python happens while one is held: neither waits for the other.
 
+use crate::errors::{self, Refusal, Refused};
+use crate::members::{Member, Members, Plan};
+use crate::names;
 use crate::run::Run;
-use crate::scenario::{load, module_paths};
+use crate::scenario::{edits, load, module_paths};
 use crate::snapshot::Snapshot;
-use crate::testbed::{matrix, write};
-use crate::{errors, names};
+use crate::testbed::{LEDGER, as_python, ledger, matrix};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyMapping, PyTuple, PyWeakrefMethods, PyWeakrefReference};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
-use terraglue::scenario::Scenario;
+use std::sync::{Arc, Mutex, PoisonError};
 use terraglue::signals::VariableRef;
-
-/// Wall time after which Python checks for signals such as Ctrl-C.
-const SLICE: Duration = Duration::from_millis(50);
-
-/// One of the testbeds.
-struct Member {
-    run: Option<Run>,
-    failed: Option<String>,
-}
 
 /// Variables whose values an array follows.
 struct Followed {
     variables: Vec<VariableRef>,
-    array: Py<PyArray2<f64>>,
+    /// It is followed as long as somebody holds it.
+    array: Py<PyWeakrefReference>,
 }
 
 /// Many testbeds of one scenario.
 #[pyclass(frozen, module = "terraglue")]
 pub struct Batch {
-    members: Vec<Mutex<Member>>,
-    threads: usize,
-    bound: Mutex<Vec<Followed>>,
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+    members: Members,
+    bound: Mutex<Vec<Arc<Followed>>>,
 }
 
 impl Batch {
-    /// Does something with each member, on all threads.
-    fn each(&self, work: impl Fn(usize, &mut Member) + Sync) {
-        let next = AtomicUsize::new(0);
-        let threads = self.threads.clamp(1, self.members.len().max(1));
-        std::thread::scope(|scope| {
-            for _ in 0..threads {
-                scope.spawn(|| {
-                    while let Some(k) =
-                        Some(next.fetch_add(1, Ordering::Relaxed)).filter(|k| *k < self.members.len())
-                    {
-                        work(k, &mut locked(&self.members[k]));
-                    }
-                });
-            }
-        });
-    }
-
-    /// Steps each member up to a time of its own.
-    fn run_to(&self, py: Python<'_>, until: impl Fn(&Run) -> f64 + Sync) -> PyResult<()> {
-        let until_s: Vec<f64> = self
-            .members
-            .iter()
-            .map(|member| locked(member).run.as_ref().map_or(f64::NEG_INFINITY, &until))
-            .collect();
+    /// Steps each up to a time of its own; after a signal, arrays show how far it came.
+    fn run_to(&self, py: Python<'_>, until_s: Vec<f64>) -> PyResult<()> {
         loop {
-            let open = AtomicUsize::new(0);
-            py.detach(|| {
-                self.each(|k, member| {
-                    let Some(run) = member.run.as_mut().filter(|_| member.failed.is_none()) else { return };
-                    match run.run_until(until_s[k], SLICE) {
-                        Ok(true) => {}
-                        Ok(false) => drop(open.fetch_add(1, Ordering::Relaxed)),
-                        Err(error) => member.failed = Some(error.to_string()),
-                    }
-                });
-            });
-            if open.load(Ordering::Relaxed) == 0 {
-                return self.follow(py);
+            let all_there = py.detach(|| self.members.step_towards(&until_s));
+            let heard = if all_there { Ok(()) } else { py.check_signals() };
+            if all_there || heard.is_err() {
+                return heard.and(self.follow(py));
             }
-            py.check_signals()?;
         }
     }
 
-    /// Values of all members, row by row.
-    fn values(&self, variables: &[VariableRef]) -> Vec<f64> {
-        let mut all = vec![f64::NAN; self.members.len() * variables.len()];
-        let rows = all.chunks_exact_mut(variables.len().max(1));
-        for (member, row) in self.members.iter().zip(rows) {
-            let member = locked(member);
-            if let Some(run) = member.run.as_ref().filter(|_| member.failed.is_none()) {
-                names::values(&run.testbed, variables, row);
+    /// Values of all, row by row; NaN of those that failed.
+    fn values(&self, py: Python<'_>, variables: &[VariableRef]) -> Vec<f64> {
+        let row = |_: usize, member: &mut Member| {
+            let mut row = vec![f64::NAN; variables.len()];
+            if let Some(run) = member.alive() {
+                names::values(&run.testbed, variables, &mut row);
             }
-        }
-        all
+            row
+        };
+        py.detach(|| self.members.map(row)).concat()
     }
 
-    /// Brings the arrays that are bound up to date.
+    /// Brings the arrays that are bound up to date; those that nobody else holds are dropped.
     fn follow(&self, py: Python<'_>) -> PyResult<()> {
-        for bound in locked(&self.bound).iter() {
-            let new = matrix(py, self.members.len(), self.values(&bound.variables))?;
-            new.copy_to(bound.array.bind(py))?;
+        let bound = self.bound.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut gone = Vec::new();
+        for followed in bound {
+            let Some(array) = followed.array.bind(py).upgrade() else {
+                gone.push(followed);
+                continue;
+            };
+            let values = self.values(py, &followed.variables);
+            let new = matrix(py, self.members.len(), followed.variables.len(), values)?;
+            new.copy_to(array.cast::<PyArray2<f64>>()?)?;
         }
+        let is_gone = |one: &Arc<Followed>| gone.iter().any(|other| Arc::ptr_eq(one, other));
+        self.bound.lock().unwrap_or_else(PoisonError::into_inner).retain(|one| !is_gone(one));
         Ok(())
     }
 
     /// Finds variables; all testbeds have the same.
     fn find(&self, py: Python<'_>, names: &[String]) -> PyResult<Vec<VariableRef>> {
-        let first = self.members.iter().map(locked).find(|member| member.run.is_some());
-        match first.as_ref().and_then(|member| member.run.as_ref()) {
-            Some(run) => names::find_all(py, &run.testbed, names),
-            None => Err(errors::ended(py, "the batch")),
+        let found = py.detach(|| self.members.first(|run| names::find_all(run, names)));
+        found.unwrap_or(Err(Refusal::Ended("the batch"))).map_err(|refusal| refusal.raise(py))
+    }
+
+    /// Does something with each, and raises the first refusal.
+    fn try_each<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl Fn(usize, &mut Member) -> Refused<T> + Sync,
+    ) -> PyResult<Vec<T>> {
+        let all: Vec<Refused<T>> = py.detach(|| self.members.map(&work));
+        let numbered =
+            all.into_iter().enumerate().map(|(k, one)| one.map_err(|refusal| refusal.of_member(k)));
+        numbered.collect::<Refused<Vec<T>>>().map_err(|refusal| refusal.raise(py))
+    }
+
+    /// Builds those that have no run, and raises the first refusal.
+    fn build(&self, py: Python<'_>) -> PyResult<()> {
+        while !py.detach(|| self.members.build()) {
+            if let Err(signal) = py.check_signals() {
+                py.detach(|| self.members.forget());
+                return Err(signal);
+            }
+        }
+        self.try_each(py, |_, member| member.refusal.take().map_or(Ok(()), |error| Err(error.into())))
+            .map(drop)
+    }
+}
+
+/// A value for each of n, from a list of them or one for all.
+fn one_each<'py>(
+    what: &str,
+    given: Option<&Bound<'py, PyAny>>,
+    n: usize,
+) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
+    let Some(given) = given.filter(|given| !given.is_none()) else { return Ok(vec![None; n]) };
+    if given.cast::<PyMapping>().is_ok() || !given.hasattr("__len__")? {
+        return Ok(vec![Some(given.clone()); n]);
+    }
+    let all = given.try_iter()?.map(|one| one.map(Some)).collect::<PyResult<Vec<_>>>()?;
+    match all.len() == n {
+        true => Ok(all),
+        false => {
+            let message = format!(
+                "{what}: a list of {n} is wanted, one for each testbed, or one for all; not {}",
+                all.len()
+            );
+            Err(errors::refused(given.py(), message))
         }
     }
 }
@@ -124,7 +132,7 @@ impl Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (scenario, n, *, seeds=None, set=None, threads=0, module_path=Vec::new()))]
+    #[pyo3(signature = (scenario, n, *, seeds=None, set=None, threads=0, module_path=Vec::new(), out=None))]
     fn new(
         scenario: &Bound<'_, PyAny>,
         n: usize,
@@ -132,46 +140,25 @@ impl Batch {
         set: Option<&Bound<'_, PyAny>>,
         threads: usize,
         module_path: Vec<PathBuf>,
+        out: Option<PathBuf>,
     ) -> PyResult<Self> {
         let py = scenario.py();
+        if n == 0 {
+            return Err(errors::refused(py, "a batch has at least one testbed"));
+        }
         if seeds.as_ref().is_some_and(|seeds| seeds.len() != n) {
             return Err(errors::refused(py, format!("seeds: {n} numbers are wanted, one for each testbed")));
         }
-        let sets: Option<Bound<'_, PyList>> = set.and_then(|set| set.cast::<PyList>().ok().cloned());
-        if sets.as_ref().is_some_and(|sets| sets.len() != n) {
-            return Err(errors::refused(
-                py,
-                format!("set: {n} dictionaries are wanted, one for each testbed, or one for all"),
-            ));
+        let sets = one_each("set", set, n)?;
+        let mut plans = Vec::with_capacity(n);
+        for (k, set) in sets.iter().enumerate() {
+            let scenario = load(scenario, set.as_ref(), seeds.as_ref().map(|seeds| seeds[k]))?;
+            plans.push(Plan { scenario, out: out.as_ref().map(|out| out.join(k.to_string())) });
         }
-        let common = set.and_then(|set| set.cast::<PyDict>().ok().cloned());
-        if set.is_some() && sets.is_none() && common.is_none() {
-            return Err(errors::refused(py, "set: a dictionary or a list of them is wanted"));
-        }
-        let modules = module_paths(py, module_path)?;
-        let mut scenarios: Vec<Scenario> = Vec::with_capacity(n);
-        for k in 0..n {
-            let own = sets.as_ref().map(|sets| sets.get_item(k)).transpose()?;
-            let own = own.as_ref().map(|own| own.cast::<PyDict>().cloned()).transpose()?;
-            scenarios.push(load(scenario, own.as_ref().or(common.as_ref()), seeds.as_ref().map(|s| s[k]))?);
-        }
-        let threads = match threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            given => given,
-        };
-        let member = |_| Mutex::new(Member { run: None, failed: None });
-        let batch = Self { members: (0..n).map(member).collect(), threads, bound: Mutex::default() };
-        let wrong = Mutex::new(None);
-        py.detach(|| {
-            batch.each(|k, member| match Run::new(scenarios[k].clone(), 1, &modules, None) {
-                Ok(run) => member.run = Some(run),
-                Err(error) => drop(locked(&wrong).get_or_insert((k, error))),
-            });
-        });
-        match wrong.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            Some((_, error)) => Err(errors::of(py, &error)),
-            None => Ok(batch),
-        }
+        let members = Members::new(plans, threads, module_paths(py, module_path)?);
+        let batch = Self { members, bound: Mutex::default() };
+        batch.build(py)?;
+        Ok(batch)
     }
 
     fn __len__(&self) -> usize {
@@ -182,51 +169,74 @@ impl Batch {
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let time =
-            |member: &Mutex<Member>| locked(member).run.as_ref().map_or(f64::NAN, |run| run.testbed.t_s());
-        self.members.iter().map(time).collect::<Vec<f64>>().to_pyarray(py)
+            |_: usize, member: &mut Member| member.run.as_ref().map_or(f64::NAN, |run| run.testbed.t_s());
+        py.detach(|| self.members.map(time)).to_pyarray(py)
+    }
+
+    /// Communication step of the first, s.
+    #[getter]
+    fn step_s(&self, py: Python<'_>) -> PyResult<f64> {
+        let step_s = py.detach(|| self.members.first(|run| run.scenario.time.step_s));
+        step_s.ok_or_else(|| Refusal::Ended("the batch").raise(py))
     }
 
     /// Why those that failed did so, by their numbers.
     #[getter]
     fn failed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let out = PyDict::new(py);
-        for (k, member) in self.members.iter().enumerate() {
-            if let Some(why) = &locked(member).failed {
-                out.set_item(k, why)?;
-            }
-        }
+        let all = py.detach(|| self.members.map(|_, member| member.failed.clone()));
+        let failed = all.into_iter().enumerate().filter_map(|(k, why)| Some((k, why?)));
+        failed.into_iter().try_for_each(|(k, why)| out.set_item(k, why))?;
         Ok(out)
     }
 
     /// Makes n communication steps in each.
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, n: u32) -> PyResult<()> {
-        self.run_to(py, |run| run.testbed.t_s() + f64::from(n) * run.scenario.time.step_s)
+        let ahead = |run: &Run| run.testbed.t_s() + f64::from(n) * run.scenario.time.step_s;
+        let until_s = |_: usize, member: &mut Member| member.run.as_ref().map_or(f64::NAN, ahead);
+        let until_s = py.detach(|| self.members.map(until_s));
+        self.run_to(py, until_s)
     }
 
-    /// Steps all up to a time, s.
-    fn run_until(&self, py: Python<'_>, t: f64) -> PyResult<()> {
-        if !t.is_finite() {
-            return Err(errors::refused(py, format!("run_until: {t} is no time")));
+    /// Steps all up to a time, s, or each up to one of its own; NaN leaves one where it is.
+    fn run_until(&self, py: Python<'_>, t: &Bound<'_, PyAny>) -> PyResult<()> {
+        let times: Vec<f64> = match t.extract::<f64>() {
+            Ok(time) if !time.is_finite() => {
+                return Err(errors::refused(py, format!("run_until: {time} is no time")));
+            }
+            Ok(time) => vec![time; self.members.len()],
+            Err(_) => t.extract().map_err(|_| {
+                errors::refused(py, "run_until: a time in s is wanted, or one for each testbed")
+            })?,
+        };
+        if times.len() != self.members.len() {
+            let message = format!("run_until: {} times are wanted, not {}", self.members.len(), times.len());
+            return Err(errors::refused(py, message));
         }
-        self.run_to(py, |_| t)
+        if times.contains(&f64::INFINITY) {
+            return Err(errors::refused(py, "run_until: inf is no time"));
+        }
+        self.run_to(py, times)
     }
 
     /// Committed values of variables: a row for each testbed.
     fn read<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let variables = self.find(py, &names)?;
-        matrix(py, self.members.len(), self.values(&variables))
+        matrix(py, self.members.len(), variables.len(), self.values(py, &variables))
     }
 
     /// The same as an array that every later step brings up to date.
     fn bind<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let variables = self.find(py, &names)?;
-        let array = matrix(py, self.members.len(), self.values(&variables))?;
-        locked(&self.bound).push(Followed { variables, array: array.clone().unbind() });
+        let array = matrix(py, self.members.len(), variables.len(), self.values(py, &variables))?;
+        let weak = PyWeakrefReference::new(array.as_any())?.unbind();
+        let followed = Arc::new(Followed { variables, array: weak });
+        self.bound.lock().unwrap_or_else(PoisonError::into_inner).push(followed);
         Ok(array)
     }
 
-    /// Sets variables: a row for each testbed, NaN leaves a value as it is.
+    /// Sets variables: a row for each testbed, NaN leaves a value as it is. All are set, or none.
     fn write(&self, py: Python<'_>, names: Vec<String>, values: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
         self.find(py, &names)?;
         if values.shape() != [self.members.len(), names.len()] {
@@ -234,44 +244,95 @@ impl Batch {
                 format!("write: an array of {} x {} numbers is wanted", self.members.len(), names.len());
             return Err(errors::refused(py, message));
         }
-        let values = values.as_array();
-        for (k, member) in self.members.iter().enumerate() {
-            let mut member = locked(member);
-            let Some(run) = member.run.as_mut() else { continue };
-            write(py, run, &names, &values.row(k).to_vec())?;
+        let rows: Vec<Vec<f64>> = values.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
+        let object = |k: usize, member: &mut Member| {
+            member.alive().map_or(Ok(()), |run| names::object(run, &names, &rows[k]))
+        };
+        self.try_each(py, object)?;
+        let write = |k: usize, member: &mut Member| {
+            member.alive().map_or(Ok(()), |run| names::write(run, &names, &rows[k]))
+        };
+        self.try_each(py, write).map(drop)
+    }
+
+    /// Energies of all subsystems of each testbed together, J; NaN of those that failed.
+    fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let of = |_: usize, member: &mut Member| {
+            member.alive().map_or([f64::NAN; LEDGER.len()], |run| ledger(&run.testbed.energy()))
+        };
+        let all = py.detach(|| self.members.map(of));
+        let out = PyDict::new(py);
+        for (part, name) in LEDGER.iter().enumerate() {
+            let column: Vec<f64> = all.iter().map(|one| one[part]).collect();
+            out.set_item(name, column.to_pyarray(py))?;
         }
-        Ok(())
+        Ok(out)
+    }
+
+    /// Builds testbed k, or each of a list of them, anew from its start, with another seed or further edits where they are given; the
+    /// others stay as they are.
+    #[pyo3(signature = (k, *, seed=None, set=None))]
+    fn restart(
+        &self,
+        py: Python<'_>,
+        k: &Bound<'_, PyAny>,
+        seed: Option<&Bound<'_, PyAny>>,
+        set: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let which: Vec<usize> = match k.extract::<usize>() {
+            Ok(one) => vec![one],
+            Err(_) => k.extract().map_err(|_| {
+                errors::refused(py, "restart: the number of a testbed is wanted, or a list of them")
+            })?,
+        };
+        if let Some(wrong) = which.iter().find(|k| **k >= self.members.len()) {
+            let message =
+                format!("restart: there is no testbed {wrong}: they are 0 to {}", self.members.len() - 1);
+            return Err(errors::refused(py, message));
+        }
+        let (seeds, sets) = (one_each("seed", seed, which.len())?, one_each("set", set, which.len())?);
+        let edit = |(seed, set): (&Option<Bound<'_, PyAny>>, &Option<Bound<'_, PyAny>>)| {
+            edits(set.as_ref(), seed.as_ref().map(|seed| seed.extract()).transpose()?)
+        };
+        let edited = seeds.iter().zip(&sets).map(edit).collect::<PyResult<Vec<_>>>()?;
+        let planned = py.detach(|| self.members.plan_again(&which, &edited));
+        planned.map_err(|refusal| refusal.raise(py))?;
+        self.build(py)?;
+        self.follow(py)
     }
 
     /// Keeps the states of all; None for those that failed.
     fn snapshot(&self, py: Python<'_>) -> PyResult<Vec<Option<Snapshot>>> {
-        let one = |member: &Mutex<Member>| {
-            let mut member = locked(member);
-            let ended = member.failed.is_some();
-            let Some(run) = member.run.as_mut().filter(|_| !ended) else { return Ok(None) };
-            let Some(place) = run.places.take() else {
-                return Err(errors::refused(py, "a testbed keeps at most 64 snapshots: drop some of them"));
-            };
-            let state = run.testbed.snapshot(place).map_err(|error| errors::of(py, &error))?;
-            Ok(Some(Snapshot { state, place, places: run.places.clone() }))
-        };
-        self.members.iter().map(one).collect()
+        self.try_each(py, |_, member| member.alive().map(Run::snapshot).transpose())
     }
 
-    /// Back to states that these testbeds have kept; None leaves one as it is.
+    /// Back to states that these testbeds have kept, also after a failure; None leaves one as it is.
     fn restore(&self, py: Python<'_>, snapshots: Vec<Option<Py<Snapshot>>>) -> PyResult<()> {
         if snapshots.len() != self.members.len() {
             return Err(errors::refused(py, format!("restore: {} snapshots are wanted", self.members.len())));
         }
-        for (member, snapshot) in self.members.iter().zip(&snapshots) {
-            let (mut member, Some(snapshot)) = (locked(member), snapshot) else { continue };
-            let snapshot = snapshot.get();
-            let Some(run) = member.run.as_mut() else { continue };
-            if !Arc::ptr_eq(&run.places, &snapshot.places) {
-                return Err(errors::refused(py, "a snapshot is one of another testbed"));
-            }
-            run.testbed.restore(&snapshot.state).map_err(|error| errors::of(py, &error))?;
-        }
+        self.try_each(py, |k, member| {
+            let (Some(run), Some(snapshot)) = (member.run.as_mut(), &snapshots[k]) else { return Ok(()) };
+            run.restore(snapshot.get())?;
+            member.failed = None;
+            Ok(())
+        })?;
         self.follow(py)
+    }
+
+    /// Ends all runs; the summary of each that was recorded.
+    fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
+        let summaries =
+            self.try_each(py, |_, member| Ok(member.run.take().map(Run::finish).transpose()?.flatten()))?;
+        summaries.into_iter().map(|one| one.map(|summary| as_python(py, &summary)).transpose()).collect()
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_error))]
+    fn __exit__(&self, py: Python<'_>, _error: &Bound<'_, PyTuple>) -> PyResult<()> {
+        self.finish(py).map(drop)
     }
 }

@@ -8,6 +8,48 @@ fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
     made.map_or_else(|error| error, |value| PyErr::from_value(value))
 }
 
+/// Why something was not done. It is made where a lock is held, and becomes an exception after that: exceptions are made by Python,
+/// which may run another thread meanwhile that waits for the same lock.
+pub enum Refusal {
+    /// An error of the simulation or of its input.
+    Failed(Error),
+    /// A value or a call that does not fit.
+    Input(String),
+    /// A name that is not there.
+    Unknown(String),
+    /// Something that is over.
+    Ended(&'static str),
+}
+
+/// A result before it is one of Python.
+pub type Refused<T = ()> = Result<T, Refusal>;
+
+impl From<Error> for Refusal {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+impl Refusal {
+    /// The exception.
+    pub fn raise(self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Failed(error) => of(py, &error),
+            Self::Input(message) => raised(py, "InputError", message),
+            Self::Unknown(message) => raised(py, "UnknownName", message),
+            Self::Ended(which) => raised(py, "SimulationError", format!("{which} has ended")),
+        }
+    }
+
+    /// The same, with the number of the testbed of a batch in front.
+    pub fn of_member(self, k: usize) -> Self {
+        match self {
+            Self::Input(message) => Self::Input(format!("testbed {k}: {message}")),
+            other => other,
+        }
+    }
+}
+
 /// The exception of an error.
 pub fn of(py: Python<'_>, error: &Error) -> PyErr {
     match error {
@@ -42,9 +84,4 @@ pub fn refused(py: Python<'_>, message: impl Into<String>) -> PyErr {
 /// A name that is not there.
 pub fn unknown(py: Python<'_>, message: String) -> PyErr {
     raised(py, "UnknownName", message)
-}
-
-/// Something that is over.
-pub fn ended(py: Python<'_>, what: &str) -> PyErr {
-    raised(py, "SimulationError", format!("{what} has ended"))
 }

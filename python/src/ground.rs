@@ -1,6 +1,6 @@
 //! Heights of the ground as arrays.
 
-use crate::errors;
+use crate::errors::{Refusal, Refused};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
@@ -10,12 +10,20 @@ use terraglue::subsystem::{FieldInfo, TileValues};
 /// World x of the columns and y of the rows, m, and the heights, m.
 pub type Heights<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
+/// A rectangle of nodes.
+pub struct Nodes {
+    /// World x, y of the first node of the lattice, and the distance of neighbours, m.
+    pub lattice: ([f64; 2], f64),
+    /// First column and row of the rectangle.
+    pub first: [usize; 2],
+    /// Row by row, m.
+    pub heights: Array2<f64>,
+}
+
 /// Arrays of a rectangle of nodes.
 pub fn arrays<'py>(
     py: Python<'py>,
-    (origin, spacing): ([f64; 2], f64),
-    first: [usize; 2],
-    heights: Array2<f64>,
+    Nodes { lattice: (origin, spacing), first, heights }: Nodes,
 ) -> Heights<'py> {
     let axis = |axis: usize, count: usize| -> Vec<f64> {
         (0..count).map(|k| origin[axis] + spacing * (first[axis] + k) as f64).collect()
@@ -25,7 +33,7 @@ pub fn arrays<'py>(
 }
 
 /// The nodes of the committed ground within x0 … x1 and y0 … y1, m.
-pub fn heights<'py>(py: Python<'py>, testbed: &Testbed, x: [f64; 2], y: [f64; 2]) -> PyResult<Heights<'py>> {
+pub fn heights(testbed: &Testbed, x: [f64; 2], y: [f64; 2]) -> Refused<Nodes> {
     for (instance, number, field) in testbed.instances().iter().flat_map(|instance| {
         instance.fields().iter().enumerate().map(move |(number, field)| (instance, number, field))
     }) {
@@ -35,13 +43,13 @@ pub fn heights<'py>(py: Python<'py>, testbed: &Testbed, x: [f64; 2], y: [f64; 2]
         let [columns, rows] = [(x, 0), (y, 1)].map(|(range, axis)| within(field, axis, range));
         if columns.is_empty() || rows.is_empty() {
             let message = format!("there is no node of the ground in x = {x:?}, y = {y:?} m");
-            return Err(errors::refused(py, message));
+            return Err(Refusal::Input(message));
         }
         let mut out = Array2::from_elem((rows.len(), columns.len()), f64::NAN);
         let edge = field.tile_edge.max(1) as usize;
         for b in rows.start / edge..=(rows.end - 1) / edge {
             for a in columns.start / edge..=(columns.end - 1) / edge {
-                let tile = instance.field_tile(number, a as u32, b as u32).map_err(|e| errors::of(py, &e))?;
+                let tile = instance.field_tile(number, a as u32, b as u32)?;
                 for j in rows.start.max(b * edge)..rows.end.min((b + 1) * edge) {
                     for i in columns.start.max(a * edge)..columns.end.min((a + 1) * edge) {
                         let node = (j - b * edge) * edge + i - a * edge;
@@ -51,9 +59,9 @@ pub fn heights<'py>(py: Python<'py>, testbed: &Testbed, x: [f64; 2], y: [f64; 2]
             }
         }
         let first = [columns.start, rows.start];
-        return Ok(arrays(py, (field.origin, field.spacing), first, out));
+        return Ok(Nodes { lattice: (field.origin, field.spacing), first, heights: out });
     }
-    Err(errors::refused(py, "no subsystem shows a ground"))
+    Err(Refusal::Input("no subsystem shows a ground".into()))
 }
 
 fn value(values: &TileValues, node: usize) -> f64 {

@@ -6,7 +6,9 @@
 mod batch;
 mod errors;
 mod ground;
+mod members;
 mod names;
+mod observe;
 mod recording;
 mod run;
 mod scenario;
@@ -22,6 +24,8 @@ fn _terraglue(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<batch::Batch>()?;
     module.add_class::<recording::Recording>()?;
     module.add_class::<snapshot::Snapshot>()?;
+    module.add_class::<observe::Observation>()?;
+    module.add_function(wrap_pyfunction!(scenario::task, module)?)?;
     module.add_function(wrap_pyfunction!(version, module)?)
 }
 

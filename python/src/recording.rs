@@ -1,16 +1,19 @@
 //! `Recording`: the recorded values of a run as arrays.
 
 use crate::errors;
-use crate::ground::{Heights, arrays};
+use crate::ground::{Heights, Nodes, arrays};
 use crate::testbed::matrix;
-use numpy::ndarray::Array2;
-use numpy::{PyArray1, PyArray2, ToPyArray};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, ToPyArray};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use terraglue::recording;
 
 /// Times (s) and values.
 type Series<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// Times (s), names, and values in each row.
+type Energies<'py> = (Bound<'py, PyArray1<f64>>, Vec<String>, Bound<'py, PyArray2<f64>>);
 
 /// Times (s) and a pose in each row.
 type Poses<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
@@ -88,7 +91,7 @@ impl Recording {
         let rows = poses.position.iter().zip(&poses.orientation);
         let values: Vec<f64> =
             rows.flat_map(|(p, q)| p.iter().chain(q).copied().collect::<Vec<_>>()).collect();
-        Ok((poses.t_s.to_pyarray(py), matrix(py, poses.t_s.len(), values)?))
+        Ok((poses.t_s.to_pyarray(py), matrix(py, poses.t_s.len(), 7, values)?))
     }
 
     /// The ground at the "start" or the "end": x of the columns, y of the rows, heights (rows × columns), m.
@@ -106,6 +109,52 @@ impl Recording {
         let heights = ground.height.iter().map(|z| f64::from(*z)).collect();
         let heights = Array2::from_shape_vec((rows, columns), heights)
             .map_err(|e| errors::refused(py, format!("the ground of the recording is damaged: {e}")))?;
-        Ok(arrays(py, (ground.origin, ground.spacing), [0, 0], heights))
+        Ok(arrays(py, Nodes { lattice: (ground.origin, ground.spacing), first: [0, 0], heights }))
+    }
+
+    /// Energies of all subsystems together over time: times (s), names, and a row of values (J) for each time.
+    fn energies<'py>(&self, py: Python<'py>) -> PyResult<Energies<'py>> {
+        let table = &self.0.energy;
+        let columns: Vec<&[f64]> = table.names.iter().filter_map(|name| table.column(name)).collect();
+        let values: Vec<f64> =
+            (0..table.t_s.len()).flat_map(|k| columns.iter().map(move |column| column[k])).collect();
+        let rows = matrix(py, table.t_s.len(), columns.len(), values)?;
+        Ok((table.t_s.to_pyarray(py), table.names.clone(), rows))
+    }
+
+    /// Times at which the ground was recorded, s: the start and each change.
+    #[getter]
+    fn ground_times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.ground_times().to_pyarray(py)
+    }
+
+    /// Heights of the ground at those times from number `first` to before `end`, (time, y, x), m.
+    fn grounds<'py>(&self, py: Python<'py>, first: usize, end: usize) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let Some(ground) = &self.0.initial_ground else {
+            return Err(errors::refused(py, "the recording has no ground"));
+        };
+        let [columns, rows] = ground.size;
+        let all = py.detach(|| self.0.grounds(first..end));
+        let count = all.len();
+        let all = Array3::from_shape_vec((count, rows, columns), all.concat())
+            .map_err(|e| errors::refused(py, format!("the ground of the recording is damaged: {e}")))?;
+        Ok(all.into_pyarray(py))
+    }
+
+    /// The ground over time, (time, y, x), m, read where it is asked for.
+    fn ground_series<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("terraglue.frames")?.call_method1("GroundSeries", (slf,))
+    }
+
+    /// Variables of one subsystem as a table of pandas, by time (s), with their units in `attrs["units"]`; all of them without names.
+    #[pyo3(signature = (names=None))]
+    fn to_pandas<'py>(slf: &Bound<'py, Self>, names: Option<Vec<String>>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("terraglue.frames")?.call_method1("to_pandas", (slf, names))
+    }
+
+    /// The same as a data set of xarray with the ground; each variable has its unit in `attrs["units"]`.
+    #[pyo3(signature = (names=None))]
+    fn to_xarray<'py>(slf: &Bound<'py, Self>, names: Option<Vec<String>>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("terraglue.frames")?.call_method1("to_xarray", (slf, names))
     }
 }

@@ -1,13 +1,18 @@
 //! A testbed with its scenario, its recording, and the states that it keeps.
 
-use crate::snapshot::Places;
+use crate::errors::{Refusal, Refused};
+use crate::observe::Follower;
+use crate::snapshot::{Place, Places, Snapshot};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use terraglue::checkpoint::States;
 use terraglue::host::HostServices;
 use terraglue::observer::Observer;
 use terraglue::recording::{Recorder, RecorderOptions, Status, Summary, write_exchange};
 use terraglue::scenario::Scenario;
+use terraglue::signals::VariableRef;
 use terraglue::testbed::{Options, Testbed};
 use terraglue::{Error, Result};
 
@@ -22,8 +27,13 @@ pub struct Run {
     pub testbed: Testbed,
     pub scenario: Scenario,
     pub places: Arc<Places>,
+    /// All variables by their full names.
+    pub variables: HashMap<String, VariableRef>,
+    pub followers: Vec<Follower>,
     recorder: Option<Recorder>,
     failed: Option<String>,
+    options: Options,
+    states: Option<States>,
 }
 
 impl Run {
@@ -48,7 +58,20 @@ impl Run {
         if let Some(folder) = out {
             write_exchange(folder, &testbed.explain())?;
         }
-        Ok(Self { testbed, scenario, places: Places::new(MOST_SNAPSHOTS), recorder, failed: None })
+        let directory = &testbed.signals().directory;
+        let variables = directory.iter().map(|(name, variable)| (name.to_owned(), variable)).collect();
+        let (places, followers) = (Places::new(MOST_SNAPSHOTS), Vec::new());
+        Ok(Self {
+            variables,
+            testbed,
+            scenario,
+            places,
+            followers,
+            recorder,
+            failed: None,
+            options,
+            states: None,
+        })
     }
 
     /// Makes steps, for `slice` of wall time at most; how many are left.
@@ -81,7 +104,10 @@ impl Run {
             if begin.elapsed() >= slice {
                 return Ok(false);
             }
-            let next = (self.testbed.t_s() + f64::from(TOGETHER) * step_s).min(until_s);
+            self.followers.retain(Follower::is_wanted);
+            // half a step ahead lies within the next one
+            let ahead = if self.followers.is_empty() { f64::from(TOGETHER) } else { 0.5 };
+            let next = (self.testbed.t_s() + ahead * step_s).min(until_s);
             let stepped = match &mut self.recorder {
                 Some(recorder) => self.testbed.run_until(next, &mut [recorder]),
                 None => self.testbed.run_until(next, &mut []),
@@ -90,13 +116,70 @@ impl Run {
                 self.failed = Some(error.to_string());
                 return Err(error);
             }
+            self.followers.iter_mut().for_each(|follower| follower.look(&self.testbed));
         }
         Ok(true)
     }
 
-    /// Whether it is recorded: then it cannot go back.
-    pub fn is_recorded(&self) -> bool {
-        self.recorder.is_some()
+    /// Keeps the whole state while the answer lives.
+    ///
+    /// # Errors
+    /// Too many are kept, or a module that cannot keep its state.
+    pub fn snapshot(&mut self) -> Refused<Snapshot> {
+        let Some(place) = self.places.take() else {
+            let message = format!("a testbed keeps at most {MOST_SNAPSHOTS} snapshots: drop some of them");
+            return Err(Refusal::Input(message));
+        };
+        let place = Place { place, places: self.places.clone() };
+        Ok(Snapshot { state: self.testbed.snapshot(place.place)?, place })
+    }
+
+    /// Back to a state that was kept, also after a failure.
+    ///
+    /// # Errors
+    /// The state is one of another testbed, or this one is recorded.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Refused {
+        if !Arc::ptr_eq(&self.places, &snapshot.place.places) {
+            return Err(Refusal::Input("the snapshot is one of another testbed".into()));
+        }
+        self.may_go_back()?;
+        self.testbed.restore(&snapshot.state)?;
+        self.failed = None;
+        Ok(())
+    }
+
+    /// The whole state as bytes.
+    ///
+    /// # Errors
+    /// A module that does not give its state as bytes.
+    pub fn serialize(&mut self) -> Refused<Vec<u8>> {
+        if self.states.is_none() {
+            self.states = Some(States::of(&self.scenario, &self.options)?);
+        }
+        Ok(self.states.as_ref().map(|states| states.bytes(&self.testbed)).transpose()?.unwrap_or_default())
+    }
+
+    /// Into the state of such bytes.
+    ///
+    /// # Errors
+    /// The bytes are damaged or of another scenario, or this testbed is recorded.
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Refused {
+        self.may_go_back()?;
+        if self.states.is_none() {
+            self.states = Some(States::of(&self.scenario, &self.options)?);
+        }
+        self.states.as_ref().map_or(Ok(()), |states| states.restore(&mut self.testbed, bytes))?;
+        self.failed = None;
+        Ok(())
+    }
+
+    fn may_go_back(&self) -> Refused {
+        match self.recorder {
+            Some(_) => {
+                Err(Refusal::Input("a testbed that is recorded cannot go back: leave `out` away".into()))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Closes recording and subsystems; the summary where it was recorded.

@@ -24,16 +24,21 @@ impl Places {
     }
 }
 
-/// The state of a testbed at a communication point, kept while this lives.
-#[pyclass(frozen, module = "terraglue")]
-pub struct Snapshot {
-    pub state: testbed::Snapshot,
+/// One of those numbers, while it is in use.
+pub struct Place {
     pub place: u32,
     pub places: Arc<Places>,
 }
 
-impl Drop for Snapshot {
+impl Drop for Place {
     fn drop(&mut self) {
         self.places.give_back(self.place);
     }
+}
+
+/// The state of a testbed at a communication point, kept while this lives.
+#[pyclass(frozen, module = "terraglue")]
+pub struct Snapshot {
+    pub state: testbed::Snapshot,
+    pub place: Place,
 }

@@ -1,18 +1,24 @@
 //! `Testbed`: a running scenario.
 
+use crate::errors::{Refusal, Refused};
 use crate::ground::{self, Heights};
-use crate::run::{MOST_SNAPSHOTS, Run};
+use crate::observe::{self, Observation};
+use crate::run::Run;
 use crate::scenario::{load, module_paths, value_of};
 use crate::snapshot::Snapshot;
 use crate::{errors, names};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
-use terraglue::Result;
+use std::time::{Duration, Instant};
+use terraglue::recording::Summary;
+use terraglue::scenario::did_you_mean;
+use terraglue::subsystem::Energy;
 
 /// Wall time after which Python checks for signals such as Ctrl-C.
 const SLICE: Duration = Duration::from_millis(50);
@@ -31,29 +37,25 @@ impl Testbed {
         self.0.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does something with the run without holding the interpreter while another thread steps it.
-    fn with<T: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(Python<'_>, &mut Run) -> PyResult<T>,
-    ) -> PyResult<T> {
-        let mut run = self.attached(py);
-        match run.as_mut() {
-            Some(run) => work(py, run),
-            None => Err(errors::ended(py, "the testbed")),
-        }
+    /// Does something with the run; nothing of Python is made before the lock is free again.
+    fn with<T>(&self, py: Python<'_>, work: impl FnOnce(&mut Run) -> Refused<T>) -> PyResult<T> {
+        let done = match self.attached(py).as_mut() {
+            Some(run) => work(run),
+            None => Err(Refusal::Ended("the testbed")),
+        };
+        done.map_err(|refusal| refusal.raise(py))
     }
 
     /// Steps in slices of wall time, between which Python checks for signals, until all are done.
     fn in_slices(
         &self,
         py: Python<'_>,
-        mut slice: impl FnMut(&mut Run) -> Result<bool> + Send,
+        mut slice: impl FnMut(&mut Run) -> Refused<bool> + Send,
     ) -> PyResult<()> {
         loop {
             match py.detach(|| self.lock().as_mut().map(&mut slice)) {
-                None => return Err(errors::ended(py, "the testbed")),
-                Some(Err(error)) => return Err(errors::of(py, &error)),
+                None => return Err(Refusal::Ended("the testbed").raise(py)),
+                Some(Err(refusal)) => return Err(refusal.raise(py)),
                 Some(Ok(true)) => return Ok(()),
                 Some(Ok(false)) => py.check_signals()?,
             }
@@ -67,7 +69,7 @@ impl Testbed {
     #[pyo3(signature = (scenario, *, set=None, seed=None, threads=1, module_path=Vec::new(), out=None))]
     fn new(
         scenario: &Bound<'_, PyAny>,
-        set: Option<&Bound<'_, PyDict>>,
+        set: Option<&Bound<'_, PyAny>>,
         seed: Option<u64>,
         threads: usize,
         module_path: Vec<PathBuf>,
@@ -83,41 +85,66 @@ impl Testbed {
     /// Simulated time, s.
     #[getter]
     fn t(&self, py: Python<'_>) -> PyResult<f64> {
-        self.with(py, |_, run| Ok(run.testbed.t_s()))
+        self.with(py, |run| Ok(run.testbed.t_s()))
     }
 
     /// Communication step, s.
     #[getter]
     fn step_s(&self, py: Python<'_>) -> PyResult<f64> {
-        self.with(py, |_, run| Ok(run.scenario.time.step_s))
+        self.with(py, |run| Ok(run.scenario.time.step_s))
     }
 
     /// Simulated time of the scenario, s.
     #[getter]
     fn duration_s(&self, py: Python<'_>) -> PyResult<f64> {
-        self.with(py, |_, run| Ok(run.scenario.time.duration_s))
+        self.with(py, |run| Ok(run.scenario.time.duration_s))
     }
 
     /// All variables by their full names.
     #[getter]
     fn names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.with(py, |_, run| Ok(run.testbed.signals().directory.names().to_vec()))
+        self.with(py, |run| Ok(run.testbed.signals().directory.names().to_vec()))
     }
 
     /// All streams by their full names.
     #[getter]
     fn streams(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.with(py, |_, run| Ok(run.testbed.signals().directory.streams().to_vec()))
+        self.with(py, |run| Ok(run.testbed.signals().directory.streams().to_vec()))
     }
 
     /// Unit of a variable.
     fn unit(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        self.with(py, |py, run| Ok(names::describe(py, &run.testbed, name)?.unit.clone()))
+        self.with(py, |run| Ok(names::describe(run, name)?.unit.clone()))
+    }
+
+    /// Units of variables.
+    fn units(&self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<String>> {
+        let unit = |run: &Run, name: &String| Ok(names::describe(run, name)?.unit.clone());
+        self.with(py, |run| names.iter().map(|name| unit(run, name)).collect())
+    }
+
+    /// All actions of `act`: help by full name.
+    #[getter]
+    fn actions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        let all = self.with(py, |run| Ok(names::actions(&run.testbed)))?;
+        all.into_iter().try_for_each(|(name, help)| out.set_item(name, help))?;
+        Ok(out)
+    }
+
+    /// Follows variables from the next step on: a row of values after each `every` steps.
+    #[pyo3(signature = (names, *, every=1))]
+    fn observe(&self, py: Python<'_>, names: Vec<String>, every: u64) -> PyResult<Observation> {
+        self.with(py, |run| {
+            let (observation, follower) = observe::begin(run, names, every)?;
+            run.followers.push(follower);
+            Ok(observation)
+        })
     }
 
     /// Meaning of a variable.
     fn help(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        self.with(py, |py, run| Ok(names::describe(py, &run.testbed, name)?.help.clone()))
+        self.with(py, |run| Ok(names::describe(run, name)?.help.clone()))
     }
 
     /// Makes n communication steps; of several threads each makes its own.
@@ -135,13 +162,13 @@ impl Testbed {
         if !t.is_finite() {
             return Err(errors::refused(py, format!("run_until: {t} is no time")));
         }
-        self.in_slices(py, |run| run.run_until(t, SLICE))
+        self.in_slices(py, |run| Ok(run.run_until(t, SLICE)?))
     }
 
     /// Committed values of variables, in their units.
     fn read<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let values = self.with(py, |py, run| {
-            let variables = names::find_all(py, &run.testbed, &names)?;
+        let values = self.with(py, |run| {
+            let variables = names::find_all(run, &names)?;
             let mut out = vec![0.0; variables.len()];
             names::values(&run.testbed, &variables, &mut out);
             Ok(out)
@@ -152,78 +179,91 @@ impl Testbed {
     /// Sets variables to numbers, which take effect in the next step; NaN leaves a value as it is.
     fn write(&self, py: Python<'_>, names: Vec<String>, values: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
         let values = values.as_array().to_vec();
-        self.with(py, |py, run| write(py, run, &names, &values))
+        self.with(py, |run| names::write(run, &names, &values))
+    }
+
+    /// For each row of `values`: sets the variables `inputs` to it, makes a step, and reads `outputs`; those in a row for each step.
+    fn drive<'py>(
+        &self,
+        py: Python<'py>,
+        inputs: Vec<String>,
+        values: PyReadonlyArray2<'_, f64>,
+        outputs: Vec<String>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let [rows, columns] = [values.shape()[0], values.shape()[1]];
+        if columns != inputs.len() {
+            let message = format!("drive: {} numbers in each row are wanted, not {columns}", inputs.len());
+            return Err(errors::refused(py, message));
+        }
+        let all: Vec<f64> = values.as_array().iter().copied().collect();
+        let found = self.with(py, |run| names::find_all(run, &outputs))?;
+        let mut out = vec![f64::NAN; rows * found.len()];
+        let mut next = 0;
+        self.in_slices(py, |run| {
+            let begin = Instant::now();
+            while next < rows && begin.elapsed() < SLICE {
+                names::write(run, &inputs, &all[next * columns..(next + 1) * columns])?;
+                run.make_steps(1, Duration::MAX)?;
+                names::values(&run.testbed, &found, &mut out[next * found.len()..(next + 1) * found.len()]);
+                next += 1;
+            }
+            Ok(next == rows)
+        })?;
+        matrix(py, rows, outputs.len(), out)
     }
 
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<f64> {
-        self.with(py, |py, run| {
-            let variable = names::find(py, &run.testbed, name)?;
-            variable.number(run.testbed.instances()).map_err(|_| {
-                errors::refused(py, format!("`{name}` is no number, or its subsystem has none now"))
-            })
+        self.with(py, |run| {
+            let variable = names::find(run, name)?;
+            let none = || Refusal::Input(format!("`{name}` is no number, or its subsystem has none now"));
+            variable.number(run.testbed.instances()).map_err(|_| none())
         })
     }
 
     fn __setitem__(&self, py: Python<'_>, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let value = value_of(value)?;
-        self.with(py, |py, run| {
-            names::find(py, &run.testbed, name)?;
-            run.testbed.set(name, &value).map_err(|error| match error {
-                terraglue::Error::Simulation { message, .. } => errors::refused(py, message),
-                other => errors::of(py, &other),
-            })
-        })
+        self.with(py, |run| names::set(run, name, &value))
     }
 
     fn __contains__(&self, py: Python<'_>, name: &str) -> PyResult<bool> {
-        self.with(py, |_, run| Ok(run.testbed.signals().directory.find(name).is_some()))
+        self.with(py, |run| Ok(run.variables.contains_key(name)))
     }
 
-    /// Does an action, `subsystem.action`, with its arguments.
+    /// Does one of `actions`, `subsystem.action`, with arguments where its module takes some.
     #[pyo3(signature = (action, **arguments))]
     fn act(&self, py: Python<'_>, action: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
         let arguments = match arguments {
             Some(arguments) => value_of(arguments.as_any())?.to_string(),
             None => "{}".to_owned(),
         };
-        self.with(py, |py, run| run.testbed.act(action, &arguments).map_err(|error| errors::of(py, &error)))
+        self.with(py, |run| names::act(run, action, &arguments))
     }
 
-    /// Keeps the whole state; [`restore`] goes back to it.
+    /// Keeps the whole state; `restore` goes back to it.
     fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
-        self.with(py, |py, run| {
-            let Some(place) = run.places.take() else {
-                let message =
-                    format!("a testbed keeps at most {MOST_SNAPSHOTS} snapshots: drop some of them");
-                return Err(errors::refused(py, message));
-            };
-            let kept = run.testbed.snapshot(place);
-            let state = kept.map_err(|error| errors::of(py, &error))?;
-            Ok(Snapshot { state, place, places: run.places.clone() })
-        })
+        self.with(py, Run::snapshot)
     }
 
     /// Back to a state that this testbed has kept, exactly.
     fn restore(&self, py: Python<'_>, snapshot: &Bound<'_, Snapshot>) -> PyResult<()> {
-        let snapshot = snapshot.get();
-        self.with(py, |py, run| {
-            if !std::sync::Arc::ptr_eq(&run.places, &snapshot.places) {
-                return Err(errors::refused(py, "the snapshot is one of another testbed"));
-            }
-            if run.is_recorded() {
-                return Err(errors::refused(
-                    py,
-                    "a testbed that is recorded cannot go back: leave `out` away",
-                ));
-            }
-            run.testbed.restore(&snapshot.state).map_err(|error| errors::of(py, &error))
-        })
+        self.with(py, |run| run.restore(snapshot.get()))
+    }
+
+    /// The whole state as bytes, for a testbed of the same scenario, here or in another process.
+    fn serialize<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.with(py, Run::serialize)?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Into the state of bytes that `serialize` has made, exactly.
+    fn deserialize(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
+        self.with(py, |run| run.deserialize(state))
     }
 
     /// Poses of all bodies by `subsystem.body`: x, y, z (m), quaternion w, x, y, z, velocity (m/s) and rotation rate (rad/s), world
     /// axes: thirteen numbers each.
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = self.with(py, |_, run| {
+        let all = self.with(py, |run| {
             Ok(run.testbed.view(|view| {
                 let of = |s: &terraglue::observer::SubsystemView| {
                     let named = s.scene.bodies.iter().zip(s.body_states);
@@ -241,38 +281,33 @@ impl Testbed {
 
     /// The ground within x0 … x1 and y0 … y1, m: x of the columns, y of the rows, heights (rows × columns), m.
     fn heights<'py>(&self, py: Python<'py>, x0: f64, x1: f64, y0: f64, y1: f64) -> PyResult<Heights<'py>> {
-        let mut run = self.attached(py);
-        match run.as_mut() {
-            Some(run) => ground::heights(py, &run.testbed, [x0, x1], [y0, y1]),
-            None => Err(errors::ended(py, "the testbed")),
-        }
+        let nodes = self.with(py, |run| ground::heights(&run.testbed, [x0, x1], [y0, y1]))?;
+        Ok(ground::arrays(py, nodes))
     }
 
     /// The newest message of a stream in the last step: time (s) and bytes; None: the step made none.
     fn message(&self, py: Python<'_>, stream: &str) -> PyResult<Option<(f64, Vec<u8>)>> {
-        self.with(py, |py, run| {
+        self.with(py, |run| {
             let found = run.testbed.view(|view| {
                 let own = view.streams.iter().find(|s| s.name == stream);
                 own.map(|s| s.messages.last().cloned())
             });
-            found.ok_or_else(|| errors::unknown(py, format!("there is no stream `{stream}`")))
+            found.ok_or_else(|| {
+                let near = did_you_mean(
+                    stream,
+                    run.testbed.signals().directory.streams().iter().map(String::as_str),
+                );
+                let near = near.map(|near| format!("; {near}")).unwrap_or_default();
+                Refusal::Unknown(format!("there is no stream `{stream}`{near}"))
+            })
         })
     }
 
     /// Energies of all subsystems together, J.
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let e = self.with(py, |_, run| Ok(run.testbed.energy()))?;
+        let energy = self.with(py, |run| Ok(run.testbed.energy()))?;
         let out = PyDict::new(py);
-        for (name, value) in [
-            ("kinetic", e.kinetic),
-            ("potential", e.potential),
-            ("dissipated", e.dissipated),
-            ("port_work", e.port_work),
-            ("actuator_work", e.actuator_work),
-            ("electrical", e.electrical),
-        ] {
-            out.set_item(name, value)?;
-        }
+        LEDGER.iter().zip(ledger(&energy)).try_for_each(|(name, value)| out.set_item(name, value))?;
         Ok(out)
     }
 
@@ -280,9 +315,7 @@ impl Testbed {
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(run) = py.detach(|| self.lock().take()) else { return Ok(None) };
         let summary = py.detach(|| run.finish()).map_err(|error| errors::of(py, &error))?;
-        let Some(summary) = summary else { return Ok(None) };
-        let text = serde_json::to_string(&summary).unwrap_or_default();
-        py.import("json")?.call_method1("loads", (text,)).map(Some)
+        summary.map(|summary| as_python(py, &summary)).transpose()
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {
@@ -295,20 +328,19 @@ impl Testbed {
     }
 }
 
-/// Sets variables of a run.
-pub fn write(py: Python<'_>, run: &mut Run, names: &[String], values: &[f64]) -> PyResult<()> {
-    if names.len() != values.len() {
-        let message = format!("write: {} numbers are wanted, one for each name", names.len());
-        return Err(errors::refused(py, message));
-    }
-    names::find_all(py, &run.testbed, names)?;
-    for (name, value) in names.iter().zip(values).filter(|(_, value)| !value.is_nan()) {
-        run.testbed.set(name, &serde_json::Value::from(*value)).map_err(|error| match error {
-            terraglue::Error::Simulation { message, .. } => errors::refused(py, message),
-            other => errors::of(py, &other),
-        })?;
-    }
-    Ok(())
+/// Parts of a ledger of energies.
+pub const LEDGER: [&str; 6] =
+    ["kinetic", "potential", "dissipated", "port_work", "actuator_work", "electrical"];
+
+/// Their values, J.
+pub fn ledger(e: &Energy) -> [f64; 6] {
+    [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work, e.electrical]
+}
+
+/// A summary as a dictionary.
+pub fn as_python<'py>(py: Python<'py>, summary: &Summary) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(summary).unwrap_or_default();
+    py.import("json")?.call_method1("loads", (text,))
 }
 
 fn numbers(state: &terraglue::subsystem::BodyState) -> Vec<f64> {
@@ -318,8 +350,12 @@ fn numbers(state: &terraglue::subsystem::BodyState) -> Vec<f64> {
     parts.concat()
 }
 
-/// A new array of n rows.
-pub fn matrix(py: Python<'_>, rows: usize, values: Vec<f64>) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    let columns = values.len().checked_div(rows).unwrap_or(0);
+/// A new array of rows and columns.
+pub fn matrix(
+    py: Python<'_>,
+    rows: usize,
+    columns: usize,
+    values: Vec<f64>,
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
     values.to_pyarray(py).reshape([rows, columns])
 }

@@ -8,9 +8,11 @@
 """
 
 from . import errors
-from ._terraglue import Batch, Recording, Snapshot, Testbed, version
+from ._terraglue import Batch, Observation, Recording, Snapshot, Testbed, version
+from .commands import check_module, compare, export_fmu, fit_soil
 from .errors import Error, InputError, ModuleError, SimulationError, UnknownName
 from .paths import MODELS, PROGRAM, SCENARIOS
+from .patterns import matching
 from .program import run
 from .soil import Soil
 
@@ -21,6 +23,7 @@ __all__ = [
     "InputError",
     "MODELS",
     "ModuleError",
+    "Observation",
     "PROGRAM",
     "Recording",
     "SCENARIOS",
@@ -29,7 +32,12 @@ __all__ = [
     "Soil",
     "Testbed",
     "UnknownName",
+    "check_module",
+    "compare",
     "errors",
+    "export_fmu",
+    "fit_soil",
+    "matching",
     "run",
     "version",
 ]

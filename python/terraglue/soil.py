@@ -71,12 +71,42 @@ class Soil:
         forces (n, 3), N, and moments (n, 3), N m, over the step."""
         position = self._rows(position, 3, "position")
         if orientation is not None:
-            orientation = self._rows(orientation, 4, "orientation")
-            self._orientation = orientation / np.linalg.norm(orientation, axis=1, keepdims=True)
+            self._orientation = self._unit(self._rows(orientation, 4, "orientation"))
         self.testbed.write(self._pose, np.concatenate([position.ravel(), self._orientation.ravel()]))
         self.testbed.step()
         force, moment = self.testbed.read(self._wrench).reshape(2, self.count, 3)
         return force, moment
+
+    def advance(self, position, orientation=None):
+        """Many steps in one call: positions (steps, n, 3) and orientations (steps, n, 4), quaternions w x y z, one for each step; without them
+        the feet keep theirs. Returns the forces (steps, n, 3), N, and moments (steps, n, 3), N m, of each step."""
+        position = self._steps(position, 3, "position")
+        steps = len(position)
+        if orientation is None:
+            orientation = np.broadcast_to(self._orientation, (steps, self.count, 4))
+        else:
+            orientation = self._steps(orientation, 4, "orientation")
+            if len(orientation) != steps:
+                raise InputError(f"orientation: {steps} steps are wanted, as of position, not {len(orientation)}")
+            orientation = self._unit(orientation)
+        poses = np.concatenate([position.reshape(steps, 3 * self.count), orientation.reshape(steps, 4 * self.count)], axis=1)
+        wrenches = self.testbed.drive(self._pose, np.ascontiguousarray(poses), self._wrench)
+        if steps:
+            self._orientation = np.array(orientation[-1])
+        force, moment = np.moveaxis(wrenches.reshape(steps, 2, self.count, 3), 1, 0)
+        return force, moment
+
+    def _steps(self, values, columns, what):
+        all_steps = np.asarray(values, dtype=float)
+        if all_steps.ndim != 3 or all_steps.shape[1:] != (self.count, columns) or not np.isfinite(all_steps).all():
+            raise InputError(f"{what}: finite numbers (steps, {self.count}, {columns}) are wanted, not an array of shape {all_steps.shape}")
+        return all_steps
+
+    def _unit(self, orientation):
+        length = np.linalg.norm(orientation, axis=-1, keepdims=True)
+        if not (length > 0.0).all():
+            raise InputError("orientation: a quaternion of length 0 is no orientation")
+        return orientation / length
 
     def snapshot(self):
         """The whole state, to go back to."""
@@ -106,6 +136,29 @@ class Soil:
             ahead, behind = (self.trial(position + sign * shift, orientation)[0] for sign in (1.0, -1.0))
             out[:, :, k] = (ahead - behind) / (2.0 * size_m)
         return out
+
+    def jacobian(self, position, orientation=None, size_m=1e-6, size_rad=1e-6):
+        """Derivatives of the wrenches by the poses at the end of a step, (n, 6, 6): rows are force x y z (N) and moment x y z (N m), columns
+        position x y z (m) and rotation about the world axes x y z through the origin of the foot (rad). By central differences, all feet at
+        once: feet that share ground have no derivatives by each other."""
+        position = self._rows(position, 3, "position")
+        orientation = self._orientation if orientation is None else self._unit(self._rows(orientation, 4, "orientation"))
+        out = np.empty((self.count, 6, 6))
+        for k in range(6):
+            size = size_m if k < 3 else size_rad
+            ahead, behind = (np.hstack(self.trial(*self._moved(position, orientation, k, sign * size))) for sign in (1.0, -1.0))
+            out[:, :, k] = (ahead - behind) / (2.0 * size)
+        return out
+
+    def _moved(self, position, orientation, k, by):
+        """Poses with coordinate k changed: moved along a world axis, or turned about one."""
+        if k < 3:
+            return position + by * np.eye(3)[k], orientation
+        half = 0.5 * by
+        w, v = np.cos(half), np.sin(half) * np.eye(3)[k - 3]
+        scalar, vector = orientation[:, :1], orientation[:, 1:]
+        turned = np.hstack([w * scalar - vector @ v[:, None], w * vector + scalar * v + np.cross(v, vector)])
+        return position, turned
 
     def heights(self, x0, x1, y0, y1):
         """The ground within a rectangle: x of the columns, y of the rows, heights, m."""

@@ -5,7 +5,9 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
+import zipfile
 from contextlib import contextmanager
 
 import pytest
@@ -69,3 +71,56 @@ def edited(tmp_path):
         return path
 
     return edit
+
+
+# The Python package
+PLATE = {
+    "time": {"step_s": 0.001, "duration_s": 0.2},
+    "terrain": {"kind": "flat", "size_m": [1.0, 0.6], "spacing_m": 0.01},
+    "soil": {"module": "soil-bekker", "parameters": "LETE_sand"},
+    "bevameter": {
+        "module": "rigid-body", "model": str(ROOT / "models/bevameter.urdf"), "fixed_base": True,
+        "motor": "velocity", "max_torque": 5000.0,
+    },
+}
+
+
+def wheel(place):
+    """The wheel as pip builds it, from the build of the tests."""
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
+    environment = {**os.environ, "TERRAGLUE_PROFILE": "debug"}
+    done = subprocess.run([*pip, "wheel", "--no-deps", "-w", place, ROOT / "python"], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-4000:]
+    (made,) = place.glob("terraglue-*-abi3-*.whl")
+    return made
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory):
+    """The folder with the installed package. Building the wheel compiles for minutes, so it is put together from the build of the tests;
+    with TERRAGLUE_TEST_WHEEL=1 it is unpacked from the wheel."""
+    place = tmp_path_factory.mktemp("package")
+    folder = place / "site"
+    if os.environ.get("TERRAGLUE_TEST_WHEEL"):
+        with zipfile.ZipFile(wheel(place)) as archive:
+            archive.extractall(folder)
+        return folder
+    shutil.copytree(ROOT / "python/terraglue", folder / "terraglue", ignore=shutil.ignore_patterns("data", "*.so", "__pycache__"))
+    built = pathlib.Path(PROGRAM).parent
+    shutil.copy(built / "lib_terraglue.so", folder / "terraglue/_terraglue.abi3.so")
+    lay_out = ["cargo", "run", "--quiet", "--package", "xtask-start", "--", "install", folder / "terraglue/data", "--built", built.name]
+    done = subprocess.run(lay_out, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="session")
+def tg(site):
+    """The package in this process; the modules of plugins have the same name and are loaded by other processes only."""
+    sys.path.insert(0, str(site))
+    try:
+        import terraglue
+    finally:
+        sys.path.remove(str(site))
+    terraglue.PROGRAM.chmod(0o755)
+    return terraglue

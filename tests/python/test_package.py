@@ -6,68 +6,15 @@ import os
 import pathlib
 import pickle
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
-import zipfile
 
 import numpy as np
 import pytest
-from conftest import PROGRAM, ROOT
-
-PLATE = {
-    "time": {"step_s": 0.001, "duration_s": 0.2},
-    "terrain": {"kind": "flat", "size_m": [1.0, 0.6], "spacing_m": 0.01},
-    "soil": {"module": "soil-bekker", "parameters": "LETE_sand"},
-    "bevameter": {
-        "module": "rigid-body", "model": str(ROOT / "models/bevameter.urdf"), "fixed_base": True,
-        "motor": "velocity", "max_torque": 5000.0,
-    },
-}
-
-
-def wheel(place):
-    """The wheel as pip builds it, from the build of the tests."""
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
-    environment = {**os.environ, "TERRAGLUE_PROFILE": "debug"}
-    done = subprocess.run([*pip, "wheel", "--no-deps", "-w", place, ROOT / "python"], env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[-4000:]
-    (made,) = place.glob("terraglue-*-abi3-*.whl")
-    return made
-
-
-@pytest.fixture(scope="session")
-def site(tmp_path_factory):
-    """The folder with the installed package. Building the wheel compiles for minutes, so it is put together from the build of the tests;
-    with TERRAGLUE_TEST_WHEEL=1 it is unpacked from the wheel."""
-    place = tmp_path_factory.mktemp("package")
-    folder = place / "site"
-    if os.environ.get("TERRAGLUE_TEST_WHEEL"):
-        with zipfile.ZipFile(wheel(place)) as archive:
-            archive.extractall(folder)
-        return folder
-    shutil.copytree(ROOT / "python/terraglue", folder / "terraglue", ignore=shutil.ignore_patterns("data", "*.so", "__pycache__"))
-    built = pathlib.Path(PROGRAM).parent
-    shutil.copy(built / "lib_terraglue.so", folder / "terraglue/_terraglue.abi3.so")
-    lay_out = ["cargo", "run", "--quiet", "--package", "xtask-start", "--", "install", folder / "terraglue/data", "--built", built.name]
-    done = subprocess.run(lay_out, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return folder
-
-
-@pytest.fixture(scope="session")
-def tg(site):
-    """The package in this process; the modules of plugins have the same name and are loaded by other processes only."""
-    sys.path.insert(0, str(site))
-    try:
-        import terraglue
-    finally:
-        sys.path.remove(str(site))
-    terraglue.PROGRAM.chmod(0o755)
-    return terraglue
+from conftest import PLATE, ROOT
 
 
 def sha(path):
@@ -183,44 +130,6 @@ def test_the_ground_is_an_array_and_shows_what_was_pressed(tg):
         testbed.heights(5.0, 6.0, 0.0, 0.1)
 
 
-SEEDS = [3, 4, 5, 6]
-
-
-def test_a_batch_has_the_bits_of_single_runs_at_any_number_of_threads(tg):
-    names = ["robot.body.x", "robot.body.z", "robot.LF_j2.torque"]
-    alone = []
-    for seed in SEEDS:
-        testbed = tg.Testbed("moon_walk", seed=seed)
-        testbed.step(120)
-        alone.append(testbed.read(names))
-    for threads in (1, 2, 5):
-        batch = tg.Batch("moon_walk", 4, seeds=SEEDS, threads=threads)
-        live = batch.bind(names)
-        batch.step(60)
-        middle = live.copy()
-        batch.step(60)
-        assert np.array_equal(live, np.array(alone)) and not np.array_equal(live, middle)
-        assert np.array_equal(batch.read(names), live) and len(batch) == 4 and not batch.failed
-
-
-def test_values_are_written_row_by_row_and_states_are_kept(tg):
-    batch = tg.Batch(PLATE, 3, set=[{"time.duration_s": 0.2 + 0.1 * k} for k in range(3)])
-    batch.write(["bevameter.small_press.velocity_target"], np.array([[0.01], [np.nan], [0.03]]))
-    batch.run_until(0.1)
-    moved = batch.read(["bevameter.small_press.angle"])[:, 0]
-    assert moved == pytest.approx([0.001, 0.0, 0.003], rel=0.1, abs=1e-4)
-    with pytest.raises(ValueError, match="3 x 1"):
-        batch.write(["bevameter.small_press.velocity_target"], np.zeros((2, 1)))
-    kept = batch.snapshot()
-    batch.run_until(0.15)
-    batch.restore(kept)
-    assert batch.t == pytest.approx([0.1] * 3)
-    assert np.array_equal(batch.read(["bevameter.small_press.angle"])[:, 0], moved)
-    for wrong in ({"seeds": [1]}, {"set": [{}]}, {"set": 3}):
-        with pytest.raises(ValueError):
-            tg.Batch(PLATE, 3, **wrong)
-
-
 def test_threads_may_share_a_testbed(tg):
     testbed = tg.Testbed(PLATE)
     errors = []
@@ -292,88 +201,6 @@ def test_the_stubs_know_everything_that_is_there(tg, site):
         body = text.split(f"class {cls.__name__}:")[1].split("\nclass ")[0]
         public = [name for name in vars(cls) if not name.startswith("_")]
         assert public and all(f"def {name}(" in body for name in public), cls
-
-
-def test_a_mass_of_ones_own_comes_to_rest_on_the_soil(tg):
-    # a sphere of 10 cm under 2 kg, with dynamics of its own in steps of the soil
-    mass, radius, h = 2.0, 0.1, 1e-3
-    soil = tg.Soil([[0.0, 0.0, radius]], radius_m=radius, step_s=h, terrain={"kind": "flat", "size_m": [1.0, 1.0], "spacing_m": 0.005})
-    z, v, force = radius, 0.0, 0.0
-    for _ in range(1500):
-        v += h * (force / mass - 9.81 - 20.0 * v)
-        z += h * v
-        wrench, _ = soil.step([[0.0, 0.0, z]])
-        force = wrench[0, 2]
-    assert force == pytest.approx(mass * 9.81, rel=0.02) and abs(v) < 1e-3
-    x, y, ground = soil.heights(-0.2, 0.2, -0.2, 0.2)
-    assert ground.min() == pytest.approx(z - radius, abs=1e-3) and z < radius
-
-
-def test_a_trial_leaves_nothing_and_derivatives_are_those_of_the_force(tg):
-    place = np.array([[0.0, 0.0, 0.03], [0.5, 0.2, 0.03]])
-    soil = tg.Soil(place, parameters="dry_sand_LLL_K010", terrain={"kind": "flat", "size_m": [2.0, 1.0], "spacing_m": 0.005})
-    for _ in range(10):
-        place[:, 2] -= 2e-4
-        force, moment = soil.step(place)
-    assert force.shape == moment.shape == (2, 3) and (force[:, 2] > 0).all()
-    deeper = place - [0.0, 0.0, 1e-4]
-    tried, _ = soil.trial(deeper)
-    again, _ = soil.trial(deeper)
-    assert np.array_equal(tried, again)
-    slope = soil.derivatives(deeper)
-    # pressed deeper, the ground pushes more; a smaller step by hand agrees
-    assert (slope[:, 2, 2] < 0).all()
-    by_hand = (soil.trial(deeper + [0.0, 0.0, 1e-7])[0] - soil.trial(deeper - [0.0, 0.0, 1e-7])[0])[:, 2] / 2e-7
-    assert slope[:, 2, 2] == pytest.approx(by_hand, rel=1e-3)
-    assert np.array_equal(soil.step(deeper)[0], tried)
-    for wrong in ([[0.0, 0.0, 0.0]], [[0.0, 0.0, float("nan")]] * 2, [[0.0, 0.0]] * 2):
-        with pytest.raises(ValueError, match="position"):
-            soil.step(wrong)
-
-
-def test_a_dragged_foot_of_a_soil_takes_as_much_work_as_it_gives_heat(tg):
-    soil = tg.Soil([[0.0, 0.0, 0.03]], module="soil-cellular-automaton", terrain={"kind": "flat", "size_m": [1.0, 0.4], "spacing_m": 0.005})
-    place, work = np.array([0.0, 0.0, 0.03]), 0.0
-    for k in range(300):
-        before = place.copy()
-        place = place + (np.array([0.0, 0.0, -1e-4]) if k < 100 else np.array([2e-4, 0.0, 0.0]))
-        force, _ = soil.step(place[None])
-        work -= float(force[0] @ (place - before))
-    energy = soil.testbed.energy()
-    kept = energy["dissipated"] + energy["potential"]
-    assert work > 0.1 and kept == pytest.approx(work, rel=0.01)
-
-
-@pytest.mark.parametrize("name", ["MoonWalk", "RoverSlope"])
-def test_environments_pass_the_checker_and_are_repeatable(tg, name):
-    gymnasium = pytest.importorskip("gymnasium", reason="gymnasium cannot be installed here")
-    from gymnasium.utils.env_checker import check_env
-
-    import terraglue.gym
-
-    small = {"period_s": 0.02, "duration_s": 0.1}
-    env = terraglue.gym.environment(name, **small)
-    with __import__("warnings").catch_warnings():
-        __import__("warnings").simplefilter("ignore")
-        check_env(env, skip_render_check=True)
-    actions = [env.action_space.sample() for _ in range(5)]
-
-    def episode(seed):
-        rows = [env.reset(seed=seed)[0]]
-        for action in actions:
-            observed, reward, fallen, over, info = env.step(action)
-            rows.append(observed)
-        assert over and not fallen and np.isfinite(reward) and info["energy_j"] >= 0
-        return np.array(rows)
-
-    assert np.array_equal(episode(3), episode(3))
-    if name == "MoonWalk":
-        assert not np.array_equal(episode(3), episode(4))
-    env.close()
-    made = gymnasium.make(f"terraglue/{name}-v0")
-    assert made.action_space.shape == env.action_space.shape
-    with pytest.raises(gymnasium.error.ResetNeeded):
-        terraglue.gym.environment(name).step(actions[0])
 
 
 @pytest.mark.parametrize("page", ["docs/python.md", "README.md"])

@@ -10,8 +10,10 @@
 struct Readme;
 
 mod origin;
+mod states;
 
 use origin::Origin;
+pub use states::States;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};

@@ -79,6 +79,16 @@ impl Origin {
         Ok(())
     }
 
+    /// Refuses another scenario, after all edits.
+    pub fn check_scenario(&self, now: &Self) -> Result {
+        let differs = match terraglue_scenario::differences(&self.text, &now.text) {
+            Some(all) if all.is_empty() => return Ok(()),
+            all => all.and_then(|all| all.first().map(|one| format!(": {one}"))).unwrap_or_default(),
+        };
+        let message = format!("the state is one of another scenario{differs}");
+        Err(refused(message, "build the testbed of the same scenario, with the same edits and the same seed"))
+    }
+
     fn check_inputs(&self, now: &Self) -> Result {
         let key = |line: &String| line.rsplit_once(' ').map_or(line.clone(), |(key, _)| key.to_owned());
         let only = |a: &[String], b: &[String]| a.iter().find(|line| !b.contains(line)).map(key);

@@ -399,6 +399,34 @@ impl Recording {
         Some((&table.t_s, table.column(variable)?))
     }
 
+    /// Times at which the ground was recorded, s: the start, and each change.
+    pub fn ground_times(&self) -> Vec<f64> {
+        let start = self.initial_ground.iter().map(|ground| ground.t_s);
+        let mut times: Vec<f64> = start.chain(self.ground_changes.iter().map(|c| c.t_s)).collect();
+        times.dedup();
+        times
+    }
+
+    /// Heights of the whole ground at each of those times with numbers in `range`, m, as [`GroundRecord::height`].
+    pub fn grounds(&self, range: std::ops::Range<usize>) -> Vec<Vec<f32>> {
+        let times = self.ground_times();
+        let Some(start) = &self.initial_ground else { return Vec::new() };
+        let mut height = start.height.clone();
+        let mut changes = self.ground_changes.iter().peekable();
+        let mut all = Vec::new();
+        for (k, t_s) in times.iter().enumerate().take(range.end) {
+            while let Some(change) = changes.next_if(|change| change.t_s <= *t_s) {
+                for (node, _, new) in &change.nodes {
+                    height.get_mut(*node as usize).into_iter().for_each(|z| *z = *new);
+                }
+            }
+            if k >= range.start {
+                all.push(height.clone());
+            }
+        }
+        all
+    }
+
     /// Unit of `subsystem.variable`; empty for a pure number.
     pub fn unit(&self, name: &str) -> &str {
         name.split_once('.').and_then(|(s, v)| self.units.get(s)?.get(v)).map_or("", String::as_str)

@@ -115,6 +115,7 @@ pub fn tables() -> Vec<Table> {
         report(),
         page(),
         sweep(),
+        task(),
         connect(),
         glue(),
         event(),
@@ -366,6 +367,36 @@ fn sweep() -> Table {
         .form(Form::Vary),
     ];
     of("sweep", "Runs that differ in some keys, for `terraglue sweep`.", keys)
+}
+
+fn task() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
+    let texts = |name, help| Key::from(text(name, help)).form(Form::Texts);
+    let keys = vec![
+        texts(
+            "observe",
+            "variables that are observed, in their units; each `*` matches within one dotted part",
+        ),
+        texts("act", "variables that are set; each `*` matches within one dotted part"),
+        list("low", "smallest value of each entry of `act`").optional().into(),
+        list("high", "largest value of each entry of `act`").optional().into(),
+        texts(
+            "reward",
+            "variables whose growth is rewarded, `robot.body.x`; their sum, at the end of an episode",
+        ),
+        texts(
+            "cost",
+            "variables whose growth the reward is divided by, `battery.energy`; where absent, the work of all drives, J",
+        ),
+        texts("tilt", "angles whose size beyond `fallen_rad` is a fall, which ends an episode with −1"),
+        number("fallen_rad", "rad", 0.8, "see `tilt`").positive().into(),
+        number("period_s", "s", 0.1, "time between two actions").positive().within_max(1e6).into(),
+        required("duration_s", "s", "time of an episode; that of the run where absent")
+            .optional()
+            .positive()
+            .into(),
+    ];
+    of("task", "An environment for learning, for `terraglue.gym` of the Python package.", keys)
 }
 
 fn connect() -> Table {

@@ -35,6 +35,7 @@ pub mod ssp;
 mod subsystems;
 mod sweep;
 mod sweep_plan;
+mod task;
 mod terrain;
 #[cfg(test)]
 mod tests;

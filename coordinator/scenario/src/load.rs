@@ -9,7 +9,7 @@ use super::node::{Node, Place, Raw};
 use super::section::Section;
 use super::set::{Edit, edit_text};
 use super::source::Source;
-use super::{page, subsystems, sweep, terrain};
+use super::{page, subsystems, sweep, task, terrain};
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_diagnostics::LARGEST_WHOLE;
@@ -65,6 +65,16 @@ impl Scenario {
         Self::checked(source)
     }
 
+    /// This scenario with further edits.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`].
+    pub fn edited(&self, sets: &[(String, String)]) -> Checked<Self> {
+        let mut source = read_source(&self.source.text, &self.source.path, sets, &[])?;
+        source.package.clone_from(&self.source.package);
+        Self::checked(source)
+    }
+
     /// The same for a text; `path` gives its name and folder.
     ///
     /// # Errors
@@ -102,6 +112,10 @@ impl Scenario {
             Some(_) => Some(with_section(&source, "sweep", sweep::read)?),
             None => None,
         };
+        let task = match source.root.get("task") {
+            Some(_) => Some(with_section(&source, "task", |s| task::read(s, &names))?),
+            None => None,
+        };
         let connections = connections(&source, &names)?;
         let glue = glue(&source, &names)?;
         let events = events(&source, &names)?;
@@ -118,6 +132,7 @@ impl Scenario {
             report,
             page,
             sweep,
+            task,
             subsystems: specs,
             connections,
             glue,

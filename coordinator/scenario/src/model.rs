@@ -41,6 +41,8 @@ pub struct Scenario {
     pub page: PageSpec,
     /// `[sweep]`.
     pub sweep: Option<SweepSpec>,
+    /// `[task]`.
+    pub task: Option<TaskSpec>,
     /// Subsystems in the order of their names.
     pub subsystems: Vec<SubsystemSpec>,
     /// `[[connect]]`.
@@ -273,6 +275,27 @@ pub enum VariedValues {
         /// Numbers on a grid, both ends among them.
         count: Option<usize>,
     },
+}
+
+/// `[task]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TaskSpec {
+    /// Variables that are observed; patterns.
+    pub observe: Vec<String>,
+    /// Variables that are set, patterns, with their ranges.
+    pub act: Vec<(String, [f64; 2])>,
+    /// Variables whose growth is rewarded.
+    pub reward: Vec<String>,
+    /// Variables whose growth the reward is divided by; empty: the work of all drives, J.
+    pub cost: Vec<String>,
+    /// Angles of a fall, rad.
+    pub tilt: Vec<String>,
+    /// Size of an angle that is a fall, rad.
+    pub fallen_rad: f64,
+    /// Time between two actions, s.
+    pub period_s: f64,
+    /// Time of an episode, s; that of the run where absent.
+    pub duration_s: Option<f64>,
 }
 
 /// `[page]`.

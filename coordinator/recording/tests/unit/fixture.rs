@@ -302,6 +302,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         },
         page: Default::default(),
         sweep: None,
+        task: None,
         subsystems: vec![part("gait", "gait"), part("robot", "rigid-body"), part("soil", "soil-bekker")],
         glue: Vec::new(),
         connections: Vec::new(),

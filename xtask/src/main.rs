@@ -20,7 +20,7 @@ use xtask_start::process::{Outcome, cargo};
 /// Developer commands.
 #[derive(Parser, Debug)]
 #[command(name = "cargo xtask", disable_help_subcommand = true)]
-struct Arguments {
+struct CommandLine {
     #[command(subcommand)]
     command: Command,
 }
@@ -71,7 +71,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let done: Outcome = match Arguments::parse().command {
+    let done: Outcome = match CommandLine::parse().command {
         Command::Test => test::test(),
         Command::Lint => ci::lint(),
         Command::Ci => ci::run(),

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 /// Measured figures, and the pictures and tables of docs/.
 #[derive(Parser, Debug)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", disable_help_subcommand = true)]
-struct Arguments {
+struct CommandLine {
     #[command(subcommand)]
     command: Command,
 }
@@ -35,7 +35,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let done = match Arguments::parse().command {
+    let done = match CommandLine::parse().command {
         Command::Validate(arguments) => terraglue_validation::validate(&arguments),
         Command::Faults => terraglue_validation::write_faults_page(),
         Command::Pictures => terraglue_validation::write_pictures(),

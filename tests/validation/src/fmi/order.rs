@@ -66,7 +66,7 @@ const ITERATE: &str = "order = \"iterate\"\n";
 const LINE: &str = "extrapolate = \"linear\"\n";
 
 /// The mass at the end of a run.
-struct End {
+struct MassEnd {
     /// m.
     x: f64,
     /// Of an oscillation with its energy, m.
@@ -74,18 +74,18 @@ struct End {
 }
 
 /// Distance from the closed form, relative to it.
-fn off(end: &End) -> f64 {
+fn off(end: &MassEnd) -> f64 {
     let exact = X0 * (K.sqrt() * END).cos();
     ((end.x - exact) / exact).abs()
 }
 
 /// A mass on a spring; `how` of the connections to the spring and to the mass.
-fn oscillate(folder: &Path, mass: &str, step_s: f64, how: [&str; 2]) -> Outcome<End> {
+fn oscillate(folder: &Path, mass: &str, step_s: f64, how: [&str; 2]) -> Outcome<MassEnd> {
     oscillate_with(folder, mass, step_s, how, "")
 }
 
 /// The same beside other FMUs.
-fn oscillate_with(folder: &Path, mass: &str, step_s: f64, how: [&str; 2], more: &str) -> Outcome<End> {
+fn oscillate_with(folder: &Path, mass: &str, step_s: f64, how: [&str; 2], more: &str) -> Outcome<MassEnd> {
     let text = format!(
         "[time]\nstep_s = {step_s}\nduration_s = {END}\n[mass]\nfmu = \"{mass}.fmu\"\n[spring]\nfmu = \"spring.fmu\"\n\
          [[connect]]\nfrom = \"mass.x\"\nto = \"spring.x\"\n{}[[connect]]\nfrom = \"spring.f\"\nto = \"mass.f\"\n{}{more}",
@@ -97,7 +97,7 @@ fn oscillate_with(folder: &Path, mass: &str, step_s: f64, how: [&str; 2], more: 
     }
     let read = |name: &str| testbed.read(name).unwrap_or(f64::NAN);
     let (x, v) = (read("mass.x"), read("mass.v"));
-    Ok(End { x, amplitude: (x * x + v * v / K).sqrt() })
+    Ok(MassEnd { x, amplitude: (x * x + v * v / K).sqrt() })
 }
 
 /// A mass that also tells its acceleration, which follows the force at once, to a display: the largest change of place and speed by that.

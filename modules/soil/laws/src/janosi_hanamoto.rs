@@ -37,12 +37,6 @@ impl JanosiHanamoto {
         if slip == 0.0 { 0.0 } else { -libm::expm1(-slip / self.modulus) }
     }
 
-    /// Slip (m) that has mobilised as much as soil of which a part has slipped by j (m) and the rest has not: its mean of e^(−j/K).
-    #[inline]
-    pub fn mean_slip(&self, slip: f64, part: f64) -> f64 {
-        -self.modulus * libm::log1p(part * libm::expm1(-slip / self.modulus))
-    }
-
     /// Solves trial − k_t·Δj = S·(1 − e^(−(j + w·Δj)/K)) for the slip increment Δj (m), which counts `weight` = w; k_t is
     /// `stiffness` (Pa/m). The left side minus the right is convex and falling, so Newton from Δj = 0 (where the exponential is
     /// `left`) climbs to the root without passing it, and the error of a step is below the square of the one before. Returns Δj

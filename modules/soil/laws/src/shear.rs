@@ -146,14 +146,11 @@ impl ShearLaw {
         }
     }
 
-    /// Slip (m) of soil of which a part has slipped by `slip` (m) and the rest has not: that which has mobilised as much, or the mean under laws that
-    /// count the slip themselves.
+    /// Slip (m) that mobilises as much as soil of which a part has slipped by `slip` (m) and the rest has not: their mean of e^(−j/K). A law of a
+    /// scenario or a module takes K of the soil, too.
     #[inline]
     pub fn mean_slip(&self, slip: f64, part: f64) -> f64 {
-        match &self.law {
-            StrengthLaw::JanosiHanamoto(law) => law.mean_slip(slip, part),
-            _ => part * slip,
-        }
+        -self.modulus * libm::log1p(part * libm::expm1(-slip / self.modulus))
     }
 
     /// Stress, tangents and new history after the foot has moved by `s` (m, along t1, t2) under the pressure p.
@@ -275,6 +272,19 @@ mod tests {
 
     fn respond(law: &ShearLaw, state: &ShearState, p: f64, s: [f64; 2]) -> ShearResponse {
         law.respond(state, p, s).expect("the built-in law always answers")
+    }
+
+    #[test]
+    fn a_part_that_has_slipped_mobilises_its_part() {
+        let law = lunar();
+        for (slip, part) in [(0.0, 0.3), (1e-9, 0.5), (0.004, 0.0), (0.02, 0.25), (0.3, 1.0)] {
+            let mean = law.mean_slip(slip, part);
+            assert!(
+                (law.mobilised(mean) - part * law.mobilised(slip)).abs() < 1e-15,
+                "{slip} {part}: {mean}"
+            );
+            assert!((0.0..=slip * (1.0 + 1e-12)).contains(&mean), "{slip} {part}: {mean}");
+        }
     }
 
     /// Largest stress.

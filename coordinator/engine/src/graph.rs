@@ -1,5 +1,7 @@
 //! Directed graphs of numbered nodes: their strongly connected components, and how deep a node lies.
 
+use std::collections::BTreeSet;
+
 /// Number of the component of each node; nodes that reach each other have the same.
 pub fn components(count: usize, edges: &[[usize; 2]]) -> Vec<usize> {
     let next = Adjacent::new(count, edges.iter().copied());
@@ -14,6 +16,13 @@ pub fn components(count: usize, edges: &[[usize; 2]]) -> Vec<usize> {
         before.visit(start, &mut seen, |node| component[node] = number);
     }
     component
+}
+
+/// Whether each node comes back to itself: an edge lies inside its component.
+pub fn in_loops(component: &[usize], edges: &[[usize; 2]]) -> Vec<bool> {
+    let inner: BTreeSet<usize> =
+        edges.iter().filter(|[a, b]| component[*a] == component[*b]).map(|[a, _]| component[*a]).collect();
+    component.iter().map(|own| inner.contains(own)).collect()
 }
 
 /// Length of the longest path of edges to each node of a graph without loops.
@@ -86,7 +95,7 @@ impl Adjacent {
 
 #[cfg(test)]
 mod tests {
-    use super::{components, levels, reached};
+    use super::{components, in_loops, levels, reached};
 
     #[test]
     fn loops_are_components_and_chains_are_not() {
@@ -94,6 +103,7 @@ mod tests {
         let c = components(6, &edges);
         assert!(c[0] == c[1] && c[1] == c[2]);
         assert!(c[3] != c[2] && c[3] != c[4] && c[5] != c[0]);
+        assert_eq!(in_loops(&c, &edges), [true, true, true, false, true, false]);
         assert_eq!(reached(6, &edges, [3].into_iter()), [false, false, false, true, true, false]);
     }
 

@@ -1,6 +1,7 @@
 //! Variables of all subsystems by their full names, read and written as what a scenario can hold.
 
 use serde_json::Value;
+use std::collections::HashMap;
 use terraglue_diagnostics::{closest, largest_plausible};
 use terraglue_host::{Instance, Reply};
 use terraglue_subsystem::{Effect, Error, Result, ValueType, Values, ValuesMut, Variable};
@@ -19,6 +20,8 @@ pub struct VariableRef {
 pub struct Directory {
     names: Vec<String>,
     refs: Vec<VariableRef>,
+    /// Places of the names among all.
+    places: HashMap<String, usize>,
     /// Full names of all streams, in the order in which they are counted.
     streams: Vec<String>,
 }
@@ -38,7 +41,9 @@ impl Directory {
         let mut directory = Self::default();
         for (slot, instance) in instances.iter().enumerate() {
             for (variable, v) in instance.variables().iter().enumerate() {
-                directory.names.push(format!("{}.{}", instance.name(), v.name));
+                let name = format!("{}.{}", instance.name(), v.name);
+                directory.places.entry(name.clone()).or_insert(directory.names.len());
+                directory.names.push(name);
                 directory.refs.push(VariableRef { slot, variable });
             }
         }
@@ -58,7 +63,7 @@ impl Directory {
 
     /// Variable of a full name.
     pub fn find(&self, name: &str) -> Option<VariableRef> {
-        self.names.iter().position(|n| n == name).map(|k| self.refs[k])
+        self.places.get(name).map(|k| self.refs[*k])
     }
 
     /// A line of help for a variable that does not exist: the one that looks most like it.

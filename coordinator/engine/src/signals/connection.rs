@@ -277,6 +277,12 @@ impl Links {
         numbers.chain(self.discrete.iter().map(|d| d.end_ids(instances))).collect()
     }
 
+    /// Settles which inputs take the value at the end of a step, where they follow a line.
+    pub fn settle_ends(&mut self, of: &FeedThroughs) {
+        let extrapolated = self.numbers.iter_mut().filter(|link| link.extrapolation.is_some());
+        extrapolated.for_each(|link| link.settle_ends(of));
+    }
+
     /// Takes a message of a stream, by its number among all, on its way to the inputs that it feeds.
     pub fn feed(&mut self, stream: usize, bytes: &[u8]) {
         self.streams.iter_mut().filter(|link| link.stream() == stream).for_each(|link| link.take(bytes));
@@ -352,13 +358,7 @@ pub fn connect(
             return Err(resolving.refuse(connection, &connection.from, message, help));
         }
     }
-    let mut links = resolving.links;
-    let extrapolated = |link: &Link| link.extrapolation.is_some();
-    if links.numbers.iter().any(extrapolated) {
-        let of = FeedThroughs::new(instances, &links.ends(instances));
-        links.numbers.iter_mut().filter(|l| extrapolated(l)).for_each(|link| link.settle_ends(&of));
-    }
-    Ok(links)
+    Ok(resolving.links)
 }
 
 /// Connections on their way into links.

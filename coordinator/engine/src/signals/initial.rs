@@ -7,7 +7,7 @@
 
 use super::connection::{Link, derivatives};
 use super::discrete::Discrete;
-use crate::graph::components;
+use crate::graph::{components, in_loops};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::Instance;
 use terraglue_numerics::dense::Lu;
@@ -145,15 +145,9 @@ fn unsolved(links: &mut [Link], instances: &mut [Instance], u: &[f64], residual:
     // An input is in a loop where its own value comes back to it over other inputs.
     let n = u.len();
     let feeds = |from: usize, to: usize| (matrix[from][to] + f64::from(u8::from(from == to))).abs() > 1e-9;
-    let mut reach: Vec<Vec<bool>> = (0..n).map(|a| (0..n).map(|b| feeds(a, b)).collect()).collect();
-    for middle in 0..n {
-        for a in 0..n {
-            for b in 0..n {
-                reach[a][b] |= reach[a][middle] && reach[middle][b];
-            }
-        }
-    }
-    let numeric: Vec<bool> = (0..n).map(|k| reach[k][k]).collect();
+    let pairs = (0..n).flat_map(|from| (0..n).map(move |to| [from, to]));
+    let edges: Vec<[usize; 2]> = pairs.filter(|[from, to]| feeds(*from, *to)).collect();
+    let numeric = in_loops(&components(n, &edges), &edges);
     let in_loop = if numeric.contains(&true) { numeric } else { around(links, instances.len(), residual, u) };
     let names: Vec<String> = links.iter().flat_map(|l| l.names(instances)).collect();
     let connections: Vec<&str> =

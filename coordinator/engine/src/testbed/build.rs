@@ -128,6 +128,7 @@ fn order(
 ) -> Result<(StepOrder, Loops)> {
     let Signals { links, faults, .. } = signals;
     let feed_through = FeedThroughs::new(instances, &links.ends(instances));
+    links.settle_ends(&feed_through);
     let mut order = StepOrder::new(links, faults, &feed_through, instances, schedules);
     let loops = Loops::new(links, faults, &feed_through, instances, schedules, state)
         .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;

@@ -5,6 +5,7 @@ use super::group::Group;
 use super::loops::Loops;
 use super::schedule::StepSchedule;
 use super::step_order::StepOrder;
+use crate::graph::{components, in_loops};
 use crate::signals::{Links, VariableRef, streams};
 use serde::{Deserialize, Serialize};
 use terraglue_host::Instance;
@@ -249,23 +250,14 @@ impl Explained<'_> {
     /// Each set of subsystems that reach each other over connections.
     fn loops(&self, ends: &[ConnectionEnds]) -> Vec<String> {
         let count = self.instances.len();
-        let mut next: Vec<Vec<usize>> = vec![Vec::new(); count];
-        ends.iter().for_each(|e| next[e.from.0].push(e.to.0));
-        let reach = |from: usize| {
-            let (mut seen, mut open) = (vec![false; count], vec![from]);
-            while let Some(slot) = open.pop() {
-                for to in next[slot].iter().filter(|to| !std::mem::replace(&mut seen[**to], true)) {
-                    open.push(*to);
-                }
-            }
-            seen
-        };
-        let all: Vec<Vec<bool>> = (0..count).map(reach).collect();
-        let first = |k: &usize| all[*k][*k] && !(0..*k).any(|j| all[*k][j] && all[j][*k]);
+        let edges: Vec<[usize; 2]> = ends.iter().map(|e| [e.from.0, e.to.0]).collect();
+        let component = components(count, &edges);
+        let looped = in_loops(&component, &edges);
+        let first = |k: &usize| looped[*k] && !component[..*k].contains(&component[*k]);
         (0..count)
             .filter(first)
             .map(|k| {
-                let is_member = |j: usize| all[k][j] && all[j][k];
+                let is_member = |j: usize| component[j] == component[k];
                 let members = (0..count).filter(|j| is_member(*j));
                 let names: Vec<&str> = members.map(|j| self.instances[j].name()).collect();
                 let mut inside = ends.iter().filter(|e| is_member(e.from.0) && is_member(e.to.0));

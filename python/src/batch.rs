@@ -6,6 +6,7 @@
 //! The lock of a testbed is taken without the interpreter's, and nothing of Python happens while one is held: neither waits for the other.
 
 use crate::errors::{self, Refusal, Refused};
+use crate::lock::locked;
 use crate::members::{Member, Members, Plan};
 use crate::names;
 use crate::run::Run;
@@ -16,7 +17,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple, PyWeakrefMethods, PyWeakrefReference};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use terraglue::signals::VariableRef;
 
 /// Variables whose values an array follows.
@@ -59,7 +60,7 @@ impl Batch {
 
     /// Brings the arrays that are bound up to date; those that nobody else holds are dropped.
     fn follow(&self, py: Python<'_>) -> PyResult<()> {
-        let bound = self.bound.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let bound = locked(&self.bound).clone();
         let mut gone = Vec::new();
         for followed in bound {
             let Some(array) = followed.array.bind(py).upgrade() else {
@@ -71,7 +72,7 @@ impl Batch {
             new.copy_to(array.cast::<PyArray2<f64>>()?)?;
         }
         let is_gone = |one: &Arc<Followed>| gone.iter().any(|other| Arc::ptr_eq(one, other));
-        self.bound.lock().unwrap_or_else(PoisonError::into_inner).retain(|one| !is_gone(one));
+        locked(&self.bound).retain(|one| !is_gone(one));
         Ok(())
     }
 
@@ -232,7 +233,7 @@ impl Batch {
         let array = matrix(py, self.members.len(), variables.len(), self.values(py, &variables))?;
         let weak = PyWeakrefReference::new(array.as_any())?.unbind();
         let followed = Arc::new(Followed { variables, array: weak });
-        self.bound.lock().unwrap_or_else(PoisonError::into_inner).push(followed);
+        locked(&self.bound).push(followed);
         Ok(array)
     }
 

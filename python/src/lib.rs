@@ -6,6 +6,7 @@
 mod batch;
 mod errors;
 mod ground;
+mod lock;
 mod members;
 mod names;
 mod observe;
@@ -25,6 +26,7 @@ fn _terraglue(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::Recording>()?;
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<observe::Observation>()?;
+    module.add_function(wrap_pyfunction!(names::matching, module)?)?;
     module.add_function(wrap_pyfunction!(scenario::task, module)?)?;
     module.add_function(wrap_pyfunction!(version, module)?)
 }

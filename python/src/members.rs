@@ -1,11 +1,12 @@
 //! The testbeds of a batch and the threads that step them; nothing here knows Python.
 
 use crate::errors::{Refusal, Refused};
+use crate::lock::locked;
 use crate::run::Run;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use terraglue::scenario::Scenario;
 
@@ -67,10 +68,6 @@ pub struct Members {
     all: Vec<Mutex<Member>>,
     threads: usize,
     modules: Vec<PathBuf>,
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Members {

@@ -1,17 +1,19 @@
 //! Variables and actions by their full names.
 
-use crate::errors::{Refusal, Refused};
+use crate::errors::{Refusal, Refused, unknown};
 use crate::run::Run;
+use pyo3::prelude::*;
 use serde_json::Value;
 use terraglue::Testbed;
+use terraglue::diagnostics::closest;
 use terraglue::scenario::did_you_mean;
-use terraglue::signals::VariableRef;
+use terraglue::signals::{VariableRef, pattern};
 use terraglue::subsystem::Variable;
 
 /// Finds a variable.
 pub fn find(run: &Run, name: &str) -> Refused<VariableRef> {
-    run.variables.get(name).copied().ok_or_else(|| {
-        let directory = &run.testbed.signals().directory;
+    let directory = &run.testbed.signals().directory;
+    directory.find(name).ok_or_else(|| {
         let hint = directory.hint(name).map(|hint| format!("; {hint}")).unwrap_or_default();
         Refusal::Unknown(format!("there is no variable `{name}`{hint}"))
     })
@@ -88,4 +90,24 @@ pub fn act(run: &mut Run, action: &str, arguments: &str) -> Refused {
         return Err(Refusal::Unknown(format!("there is no action `{action}`; {hint}")));
     }
     Ok(run.testbed.act(action, arguments)?)
+}
+
+/// The names that match, pattern by pattern; each `*` matches within one dotted part, as in connections of scenarios.
+#[pyfunction]
+pub fn matching(py: Python<'_>, names: Vec<String>, patterns: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    let patterns = match patterns.extract::<String>() {
+        Ok(one) => vec![one],
+        Err(_) => patterns.extract::<Vec<String>>()?,
+    };
+    let mut found = Vec::new();
+    for pattern in patterns {
+        let before = found.len();
+        found.extend(names.iter().filter(|name| pattern::matches(&pattern, name)).cloned());
+        if found.len() == before {
+            let near = closest(&pattern, names.iter().map(String::as_str));
+            let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+            return Err(unknown(py, format!("no variable matches `{pattern}`{hint}")));
+        }
+    }
+    Ok(found)
 }

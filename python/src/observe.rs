@@ -1,11 +1,12 @@
 //! `Observation`: values at every communication point of a testbed that goes on in long stretches.
 
+use crate::lock::locked;
 use crate::run::Run;
 use crate::testbed::matrix;
 use crate::{errors, names};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, Weak};
 use terraglue::Testbed;
 use terraglue::signals::VariableRef;
 
@@ -51,10 +52,6 @@ pub struct Observation {
     names: Vec<String>,
     units: Vec<String>,
     rows: Arc<Mutex<Rows>>,
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Begins one.

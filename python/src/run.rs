@@ -3,7 +3,6 @@
 use crate::errors::{Refusal, Refused};
 use crate::observe::Follower;
 use crate::snapshot::{Place, Places, Snapshot};
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -12,7 +11,6 @@ use terraglue::host::HostServices;
 use terraglue::observer::Observer;
 use terraglue::recording::{Recorder, RecorderOptions, Status, Summary, write_exchange};
 use terraglue::scenario::Scenario;
-use terraglue::signals::VariableRef;
 use terraglue::testbed::{Options, Testbed};
 use terraglue::{Error, Result};
 
@@ -27,8 +25,6 @@ pub struct Run {
     pub testbed: Testbed,
     pub scenario: Scenario,
     pub places: Arc<Places>,
-    /// All variables by their full names.
-    pub variables: HashMap<String, VariableRef>,
     pub followers: Vec<Follower>,
     recorder: Option<Recorder>,
     failed: Option<String>,
@@ -58,20 +54,8 @@ impl Run {
         if let Some(folder) = out {
             write_exchange(folder, &testbed.explain())?;
         }
-        let directory = &testbed.signals().directory;
-        let variables = directory.iter().map(|(name, variable)| (name.to_owned(), variable)).collect();
         let (places, followers) = (Places::new(MOST_SNAPSHOTS), Vec::new());
-        Ok(Self {
-            variables,
-            testbed,
-            scenario,
-            places,
-            followers,
-            recorder,
-            failed: None,
-            options,
-            states: None,
-        })
+        Ok(Self { testbed, scenario, places, followers, recorder, failed: None, options, states: None })
     }
 
     /// Makes steps, for `slice` of wall time at most; how many are left.

@@ -1,7 +1,8 @@
 //! States of testbeds that can be gone back to.
 
+use crate::lock::locked;
 use pyo3::prelude::*;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use terraglue::testbed;
 
 /// Numbers of the states that a testbed can keep at a time.
@@ -16,11 +17,11 @@ impl Places {
 
     /// A free one; none: all are taken.
     pub fn take(&self) -> Option<u32> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop()
+        locked(&self.0).pop()
     }
 
     fn give_back(&self, place: u32) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(place);
+        locked(&self.0).push(place);
     }
 }
 

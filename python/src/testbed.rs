@@ -2,6 +2,7 @@
 
 use crate::errors::{Refusal, Refused};
 use crate::ground::{self, Heights};
+use crate::lock::locked;
 use crate::observe::{self, Observation};
 use crate::run::Run;
 use crate::scenario::{load, module_paths, value_of};
@@ -29,7 +30,7 @@ pub struct Testbed(Mutex<Option<Run>>);
 
 impl Testbed {
     fn lock(&self) -> MutexGuard<'_, Option<Run>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0)
     }
 
     /// The same, while the interpreter goes on with other threads until it is free.
@@ -226,7 +227,7 @@ impl Testbed {
     }
 
     fn __contains__(&self, py: Python<'_>, name: &str) -> PyResult<bool> {
-        self.with(py, |run| Ok(run.variables.contains_key(name)))
+        self.with(py, |run| Ok(run.testbed.signals().directory.find(name).is_some()))
     }
 
     /// Does one of `actions`, `subsystem.action`, with arguments where its module takes some.

@@ -8,11 +8,10 @@
 """
 
 from . import errors
-from ._terraglue import Batch, Observation, Recording, Snapshot, Testbed, version
+from ._terraglue import Batch, Observation, Recording, Snapshot, Testbed, matching, version
 from .commands import check_module, compare, export_fmu, fit_soil
 from .errors import Error, InputError, ModuleError, SimulationError, UnknownName
 from .paths import MODELS, PROGRAM, SCENARIOS
-from .patterns import matching
 from .program import run
 from .soil import Soil
 

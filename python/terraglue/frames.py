@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ._terraglue import matching
 from .errors import Error
-from .patterns import matching
 
 
 class GroundSeries:

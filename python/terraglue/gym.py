@@ -15,10 +15,9 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ._terraglue import Batch, Testbed
+from ._terraglue import Batch, Testbed, matching
 from ._terraglue import task as _table
 from .errors import InputError, SimulationError
-from .patterns import matching
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,9 +4,11 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import zipfile
 from contextlib import contextmanager
 
@@ -124,3 +126,16 @@ def tg(site):
         sys.path.remove(str(site))
     terraglue.PROGRAM.chmod(0o755)
     return terraglue
+
+
+def interrupted(site, code):
+    """Exit code, output and errors of a program with the package, which says "ready" and is stopped by Ctrl-C soon after."""
+    # a process in the background of a shell has it ignored
+    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    process = subprocess.Popen([sys.executable, "-c", code], env=environment, preexec_fn=heard, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    out, said = process.communicate(timeout=20)
+    return process.returncode, out, said

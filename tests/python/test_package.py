@@ -6,15 +6,13 @@ import os
 import pathlib
 import pickle
 import re
-import signal
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pytest
-from conftest import PLATE, ROOT
+from conftest import PLATE, ROOT, interrupted
 
 
 def sha(path):
@@ -150,15 +148,8 @@ def test_threads_may_share_a_testbed(tg):
 
 def test_ctrl_c_ends_a_long_run(site, tmp_path):
     code = "import terraglue\nt = terraglue.Testbed('moon_walk', set={'time.duration_s': 1000.0})\nprint('ready', flush=True)\nt.run_until(1000.0)\n"
-    # a process in the background of a shell has it ignored
-    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
-    environment = {**os.environ, "PYTHONPATH": str(site)}
-    process = subprocess.Popen([sys.executable, "-c", code], env=environment, preexec_fn=heard, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "ready\n"
-    time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=20)
-    assert "KeyboardInterrupt" in said and process.returncode != 0
+    code_of_exit, _, said = interrupted(site, code)
+    assert "KeyboardInterrupt" in said and code_of_exit != 0
 
 
 def test_a_recording_is_read_as_arrays(tg, tmp_path):

@@ -2,14 +2,12 @@
 
 import collections.abc
 import os
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from conftest import PLATE
+from conftest import PLATE, interrupted
 
 SEEDS = [3, 4, 5, 6]
 
@@ -110,14 +108,8 @@ except KeyboardInterrupt:
     assert batch.t[2] == 0.0
     print("went on", flush=True)
 """
-    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
-    environment = {**os.environ, "PYTHONPATH": str(site)}
-    process = subprocess.Popen([sys.executable, "-c", code], env=environment, preexec_fn=heard, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "ready\n"
-    time.sleep(0.3)
-    process.send_signal(signal.SIGINT)
-    out, said = process.communicate(timeout=30)
-    assert out == "went on\n" and process.returncode == 0, said
+    code_of_exit, out, said = interrupted(site, code)
+    assert out == "went on\n" and code_of_exit == 0, said
 
 
 BREAKS = """\"\"\"A controller that fails at a time of its own.

@@ -39,7 +39,7 @@ def opened(**context):
     room = browser().new_context(**context)
     page = room.new_page()
     # a machine may be busy with other tests
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(300_000)
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda m: errors.append(m.text) if m.type == "error" and not any(k in m.text for k in KNOWN) else None)
@@ -52,7 +52,7 @@ def opened(**context):
 
 def ready(page):
     """Waits until the page shows its content."""
-    page.wait_for_function("document.documentElement.dataset.ready", timeout=60_000)
+    page.wait_for_function("document.documentElement.dataset.ready")
 
 
 # Colours of the view in a grid of places, as the canvas holds them.

@@ -137,5 +137,5 @@ def interrupted(site, code):
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.3)
     process.send_signal(signal.SIGINT)
-    out, said = process.communicate(timeout=20)
+    out, said = process.communicate(timeout=300)
     return process.returncode, out, said

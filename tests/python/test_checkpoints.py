@@ -57,7 +57,7 @@ def end_after_a_checkpoint(out, how, *arguments):
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.002)
     process.send_signal(how)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=300)
     assert process.returncode == {signal.SIGKILL: -signal.SIGKILL, signal.SIGINT: 130}[how]
     return said
 

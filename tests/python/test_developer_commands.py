@@ -11,7 +11,7 @@ from documented import xtask
 
 def asked(program, *arguments):
     environment = {**os.environ, "CARGO": "/bin/echo"}
-    return subprocess.run([program, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60)
+    return subprocess.run([program, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
 
 
 @pytest.mark.parametrize("options", [[], ["--no-timing"], ["--quick"]])
@@ -37,7 +37,7 @@ def test_what_cargo_xtask_starts_hands_on_all_but_installing(tmp_path):
     assert done.returncode == 2 and "<PREFIX>" in done.stderr and done.stdout == ""
     # the release profile of the program is all that an install builds
     built = subprocess.run([start, "install", tmp_path / "x"], cwd=ROOT, capture_output=True, text=True,
-                           env={**os.environ, "CARGO": "/bin/false"}, timeout=60)
+                           env={**os.environ, "CARGO": "/bin/false"}, timeout=300)
     assert built.returncode == 1 and not (tmp_path / "x").exists()
     lines = [line for line in built.stderr.splitlines() if line.startswith("$")]
     assert lines == ["$ false build --release --package terraglue-cli --package terraglue-fmu-library"]

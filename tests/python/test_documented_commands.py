@@ -17,7 +17,7 @@ from conftest import PROGRAM, ROOT, terraglue
 def helps(program, path):
     """The `--help` of a subcommand; none: there is no such."""
     command = [PROGRAM if program == "terraglue" else documented.xtask(path), *path.split(), "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     return done.stdout if done.returncode == 0 else None
 
 

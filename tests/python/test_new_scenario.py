@@ -118,11 +118,11 @@ def test_the_ground_of_a_large_robot_fits(tmp_path):
     hull = LINK.format(name="hull", com=0, mass=1e6, i=1e9, shape=shape('<box size="3000 200 20"/>'))
     robot.write_text(f'<robot name="ship">{hull}</robot>')
     assert terraglue("new", "scenario", "--robot", robot, "-o", tmp_path / "moon").returncode == 0
-    checked = terraglue("check", tmp_path / "moon" / "scenario.toml", timeout=60)
+    checked = terraglue("check", tmp_path / "moon" / "scenario.toml", timeout=300)
     assert checked.returncode == 0, checked.stderr
     # nor does a robot that is larger than its ground need the memory of a larger one
     small = terraglue("check", tmp_path / "moon" / "scenario.toml", "--set", "terrain.size_m=[1.0,1.0]",
-                      "--set", "terrain.spacing_m=0.001", timeout=60)
+                      "--set", "terrain.spacing_m=0.001", timeout=300)
     assert small.returncode == 0, small.stderr
 
 

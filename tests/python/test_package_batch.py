@@ -50,7 +50,7 @@ def test_values_are_written_row_by_row_and_states_are_kept(tg):
 PRESS = "bevameter.small_press.angle"
 
 
-def aside(site, code, timeout=60):
+def aside(site, code, timeout=300):
     """Runs a program in a process of its own: what hangs is ended, and fails."""
     code = f"PLATE = {PLATE!r}\nimport sys, threading, time\nimport numpy as np\nimport terraglue\n" + code
     done = subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(site)}, capture_output=True, text=True, timeout=timeout)

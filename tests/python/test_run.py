@@ -158,7 +158,7 @@ def test_an_interrupted_run_closes_its_recording(tmp_path):
     process = start(folder, "--duration", "600")
     wait_for_messages(folder / "recording.mcap", process)
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    process.communicate(timeout=300)
     assert process.returncode == 130
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == "stopped" and 0 < summary["simulated_s"] < 600

@@ -162,7 +162,7 @@ def test_ctrl_c_leaves_what_is_done_and_no_process(tmp_path):
     while not list(tmp_path.glob("sweep/cases/*/case.json")):
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=300)
     assert process.returncode == 130 and "goes on from here" in said
     with pytest.raises(ProcessLookupError):
         os.killpg(process.pid, 0)

@@ -114,6 +114,7 @@ function start() {
   keepAddress(run, stage, scope);
   // for scripts that drive the page
   document.addEventListener("terraglue:frames", (event) => event.detail(stage?.view.frames ?? 0));
+  document.addEventListener("terraglue:busy", (event) => event.detail(stage?.busy ?? false));
 }
 
 start();

@@ -11,6 +11,7 @@ from . import errors
 from ._terraglue import Batch, Observation, Recording, Snapshot, Testbed, matching, version
 from .commands import check_module, compare, export_fmu, fit_soil
 from .errors import Error, InputError, ModuleError, SimulationError, UnknownName
+from .page import Page, serve
 from .paths import MODELS, PROGRAM, SCENARIOS
 from .program import run
 from .soil import Soil
@@ -24,6 +25,7 @@ __all__ = [
     "ModuleError",
     "Observation",
     "PROGRAM",
+    "Page",
     "Recording",
     "SCENARIOS",
     "SimulationError",
@@ -38,5 +40,6 @@ __all__ = [
     "fit_soil",
     "matching",
     "run",
+    "serve",
     "version",
 ]

@@ -1,6 +1,7 @@
 """One FMU alone: kept apart in a process of its own, ended by itself, and shown without running it."""
 
 import json
+import math
 import subprocess
 import sysconfig
 import zipfile
@@ -87,6 +88,20 @@ def test_a_step_that_hangs_is_ended_and_the_way_out_named(tmp_path):
     for words in ("after t = 0.5 s", "within 5 s", "--timeout"):
         assert words in ended.stderr
     assert "[default: 30]" in terraglue("fmu", "run", "--help").stdout
+
+
+@pytest.mark.parametrize("apart", [[], ["--isolate"]])
+@pytest.mark.parametrize("value", ["z / z", "1 / z"])
+def test_a_value_that_is_no_number_stops_the_run_or_is_written(tmp_path, apart, value):
+    fmu = cfmu.build(tmp_path, "vague", REALS, f"double z = 0; r[0] = t > 0.45 ? {value} : t + h;")
+    ended = run(fmu, *apart)
+    assert ended.returncode == 1 and "`x` is" in ended.stderr and "--on-nan warn" in ended.stderr
+    assert len(ended.stdout.splitlines()) == 7
+    ended = run(fmu, "--on-nan", "warn", *apart)
+    assert ended.returncode == 0 and ended.stderr.count("`x` is") == 1 and "t = 0.6" in ended.stderr, ended.stderr
+    rows = [line.split(",") for line in ended.stdout.splitlines()[1:]]
+    assert [math.isfinite(float(x)) for _, x in rows] == [True] * 6 + [False] * 5
+    assert terraglue("fmu", "run", fmu, "--on-nan", "log").returncode == 2
 
 
 def test_a_long_run_of_short_steps_is_not_ended(tmp_path):

@@ -9,6 +9,7 @@ use crate::video_arguments::VideoArguments;
 use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use terraglue_fmu::OnNan;
 use terraglue_scaffold::{Kind, Language};
 
 /// Simulates robots on deformable ground: rigid bodies, soils and controllers, glued into one run.
@@ -645,6 +646,9 @@ pub struct FmuRunArguments {
     /// Write every call of the FMU here before it is made, with its values by reference and its status.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
+    /// What a value that is NaN or infinite does: it stops the run, or is warned of once and written.
+    #[arg(long, value_name = "stop|warn", default_value = "stop", value_parser = on_nan)]
+    pub on_nan: OnNan,
     /// Names to write, separated by commas [default: all outputs].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub output: Vec<String>,
@@ -662,6 +666,11 @@ pub struct FmuRunArguments {
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, default_value = "off",
           value_parser = clap::builder::BoolishValueParser::new())]
     pub event_mode: bool,
+}
+
+/// As the key `on_nan` of an FMU in a scenario.
+fn on_nan(text: &str) -> Result<OnNan, String> {
+    OnNan::of(text).ok_or_else(|| "stop or warn is wanted".to_owned())
 }
 
 /// A finite number above 0.

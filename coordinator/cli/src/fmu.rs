@@ -121,6 +121,7 @@ fn settings(arguments: &FmuRunArguments) -> Result<Settings> {
         log_categories: arguments.log_categories.clone(),
         strict: arguments.strict,
         trace: arguments.trace.as_deref().map(traced).transpose()?,
+        on_nan: arguments.on_nan,
     })
 }
 

@@ -5,12 +5,24 @@ use std::path::PathBuf;
 use terraglue_subsystem::{Error, Result};
 
 /// Reaction to a value that is no number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnNan {
     /// It stops the run.
+    #[default]
     Stop,
     /// It is logged; what reads it decides.
     Warn,
+}
+
+impl OnNan {
+    /// By its name.
+    pub fn of(name: &str) -> Option<Self> {
+        match name {
+            "stop" => Some(Self::Stop),
+            "warn" => Some(Self::Warn),
+            _ => None,
+        }
+    }
 }
 
 /// Keys of the host in the table of an FMU.
@@ -62,9 +74,10 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
         let wrong = |takes: &str| Error::Refused(format!("`{key}` takes {takes}, not {value}"));
         let time = || value.as_f64().filter(|x| x.is_finite()).ok_or_else(|| wrong("a time in s"));
         match (key.as_str(), value) {
-            ("on_nan", Value::String(t)) if t == "stop" => options.on_nan = OnNan::Stop,
-            ("on_nan", Value::String(t)) if t == "warn" => options.on_nan = OnNan::Warn,
-            ("on_nan", _) => return Err(wrong("\"stop\" or \"warn\"")),
+            ("on_nan", _) => {
+                let own = value.as_str().and_then(OnNan::of);
+                options.on_nan = own.ok_or_else(|| wrong("\"stop\" or \"warn\""))?;
+            }
             ("event_mode", Value::Bool(on)) => options.event_mode = *on,
             ("event_mode", _) => return Err(wrong("true or false")),
             ("rollback", Value::Bool(on)) => options.rollback = *on,

@@ -2,6 +2,8 @@
 
 use super::inputs::{self, Inputs, set_text};
 use super::map::{element_name, find};
+use super::settings::OnNan;
+use std::cell::Cell;
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::instance::{Sink, Trace};
@@ -37,6 +39,8 @@ pub struct Settings {
     pub strict: bool,
     /// Takes a line for each call of the FMU.
     pub trace: Option<Trace>,
+    /// Reaction to a value that is no number.
+    pub on_nan: OnNan,
 }
 
 /// Takes a line of a table.
@@ -109,8 +113,9 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
             "the run ends at t = {end} s, before {stop} s: the FMU takes steps of one length only"
         ));
     }
+    let values = Row { columns: &columns, on_nan: settings.on_nan, warned: Cell::new(false) };
     row(&marked(header(&columns), 0))?;
-    row(&marked(line(&instance, start, &columns)?, 0))?;
+    row(&marked(values.at(&instance, start)?, 0))?;
     let mut before = Before { state: FmuState::default(), saves: description.capabilities.state };
     let mut ended = None;
     let outcome = (0..steps as u64).try_for_each(|k| {
@@ -126,7 +131,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let step = halving(&mut instance, &inputs, &mut before, (t, end), &mut tables.intermediate);
         (ended, events) = step.map_err(|e| at(inputs.way_out(e, end)))?;
         let now = ended.unwrap_or(end);
-        row(&marked(line(&instance, now, &columns).map_err(|e| named(e, now))?, events))
+        row(&marked(values.at(&instance, now).map_err(|e| named(e, now))?, events))
     });
     (tables.keep)()?;
     drop(instance.release(&mut before.state));
@@ -347,19 +352,41 @@ fn short<T: std::fmt::Display + std::fmt::LowerExp>(x: T, size: f64) -> String {
     }
 }
 
-/// One line of the table; numbers are written so that reading them gives the same bits.
-fn line(instance: &FmuInstance, t: f64, columns: &[&Variable]) -> Result<String> {
-    let mut text = exact(t);
-    for v in columns {
-        for value in read(instance, v)? {
-            text.push(',');
-            text.push_str(&quoted(&value));
-        }
-    }
-    Ok(text)
+/// Makes the lines of the table.
+struct Row<'a> {
+    columns: &'a [&'a Variable],
+    on_nan: OnNan,
+    /// Whether a value that is no number was told.
+    warned: Cell<bool>,
 }
 
-fn read(instance: &FmuInstance, v: &Variable) -> Result<Vec<String>> {
+impl Row<'_> {
+    /// The line of t; numbers are written so that reading them gives the same bits.
+    fn at(&self, instance: &FmuInstance, t: f64) -> Result<String> {
+        let mut text = exact(t);
+        for v in self.columns {
+            for value in read(instance, v, |wrong| self.not_finite(instance, v, t, wrong))? {
+                text.push(',');
+                text.push_str(&quoted(&value));
+            }
+        }
+        Ok(text)
+    }
+
+    #[cold]
+    fn not_finite(&self, instance: &FmuInstance, v: &Variable, t: f64, wrong: f64) -> Result {
+        let text = format!("the variable `{}` is {wrong}", v.name);
+        match self.on_nan {
+            OnNan::Stop => return Err(Error::Refused(format!("{text}; --on-nan warn lets the run go on"))),
+            OnNan::Warn if !self.warned.replace(true) => instance.note(&format!("at t = {t} s: {text}")),
+            OnNan::Warn => {}
+        }
+        Ok(())
+    }
+}
+
+/// The values of a variable as text; `not_finite` decides about one that is no number.
+fn read(instance: &FmuInstance, v: &Variable, not_finite: impl Fn(f64) -> Result) -> Result<Vec<String>> {
     macro_rules! values {
         ($variant:ident, $zero:expr, $show:expr) => {{
             let mut out = vec![$zero; v.len()];
@@ -372,7 +399,7 @@ fn read(instance: &FmuInstance, v: &Variable) -> Result<Vec<String>> {
             let mut out = vec![$zero; v.len()];
             instance.get(&[v.reference], ValuesMut::$variant(&mut out))?;
             if let Some(wrong) = out.iter().find(|x| !x.is_finite()) {
-                return Err(Error::Refused(format!("the variable `{}` is {wrong}", v.name)));
+                not_finite((*wrong).into())?;
             }
             Ok(out.iter().map($show).collect())
         }};

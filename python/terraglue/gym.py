@@ -81,6 +81,26 @@ class Task:
         low, high = (np.array([getattr(action, end) for action in self.act]) for end in ("low", "high"))
         return np.ascontiguousarray(np.clip(np.asarray(actions, dtype=float), low, high))
 
+    # `runs` is a testbed, whose results are those of one episode, or a batch, whose results have a row for each
+
+    def _observed(self, runs):
+        return np.nan_to_num(runs.read(list(self.observe)))
+
+    def _counted(self, runs):
+        """What is rewarded and what it costs, both since the start of the run."""
+        cost = runs.read(list(self.cost)).sum(axis=-1) if self.cost else runs.energy()["actuator_work"]
+        return np.stack([runs.read(list(self.reward)).sum(axis=-1), cost], axis=-1)
+
+    def _has_fallen(self, runs):
+        return np.abs(np.nan_to_num(runs.read(list(self.tilt)))).max(axis=-1, initial=0.0) > self.fallen_rad
+
+    def _is_over(self, runs):
+        return runs.t >= self.duration_s - 0.5 * runs.step_s
+
+    @staticmethod
+    def _reward(fallen, ended, gain, cost):
+        return np.where(fallen, -1.0, np.where(ended, gain / np.maximum(cost, 1e-9), 0.0))
+
 
 class Environment(gymnasium.Env):
     """One testbed as an environment.
@@ -109,8 +129,8 @@ class Environment(gymnasium.Env):
         if self._testbed is not None:
             self._testbed.finish()
         self._testbed = self._make(self.task.scenario, set=dict(self.task.set or {}), seed=own)
-        self._begun = self._counted()
-        return self._observed(), {"seed": own}
+        self._begun = self.task._counted(self._testbed)
+        return self.task._observed(self._testbed), {"seed": own}
 
     def step(self, action):
         task, testbed = self.task, self._testbed
@@ -122,26 +142,16 @@ class Environment(gymnasium.Env):
         except SimulationError as error:
             nothing = np.zeros(self.observation_space.shape)
             return nothing, -1.0, True, False, {"gain": np.nan, "cost": np.nan, "error": str(error)}
-        gain, cost = self._counted() - self._begun
-        info = {"gain": gain, "cost": cost}
-        if np.abs(testbed.read(list(task.tilt))).max(initial=0.0) > task.fallen_rad:
-            return self._observed(), -1.0, True, False, info
-        over = testbed.t >= task.duration_s - 0.5 * testbed.step_s
-        reward = gain / max(cost, 1e-9) if over else 0.0
-        return self._observed(), float(reward), False, bool(over), info
+        gain, cost = task._counted(testbed) - self._begun
+        fallen = bool(task._has_fallen(testbed))
+        over = bool(task._is_over(testbed)) and not fallen
+        reward = float(task._reward(fallen, over, gain, cost))
+        return task._observed(testbed), reward, fallen, over, {"gain": gain, "cost": cost}
 
     def close(self):
         if self._testbed is not None:
             self._testbed.finish()
             self._testbed = None
-
-    def _observed(self):
-        return np.nan_to_num(self._testbed.read(list(self.task.observe)))
-
-    def _counted(self):
-        task, testbed = self.task, self._testbed
-        cost = testbed.read(list(task.cost)).sum() if task.cost else testbed.energy()["actuator_work"]
-        return np.array([testbed.read(list(task.reward)).sum(), cost])
 
 
 class VectorEnvironment(VectorEnv):
@@ -181,7 +191,7 @@ class VectorEnvironment(VectorEnv):
         if len(seed) != self.num_envs:
             raise InputError(f"seed: {self.num_envs} numbers are wanted, one for each environment")
         infos = self._start(np.flatnonzero(which), seed)
-        return self._observed(), infos
+        return self.task._observed(self._batch), infos
 
     def step(self, actions):
         if self._batch is None:
@@ -196,14 +206,14 @@ class VectorEnvironment(VectorEnv):
         rewards, fallen, ended, own = self._judged(over)
         self._over = fallen | ended
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
-            observed = self._observed()
+            observed = self.task._observed(self._batch)
             own = {k: {"final_obs": observed[k], "final_info": info} if self._over[k] else info for k, info in own.items()}
             over = self._over.copy()
         infos = {}
         for k, info in own.items():
             infos = self._add_info(infos, info, k)
         infos = self._start(np.flatnonzero(over), infos=infos) if over.any() else infos
-        return self._observed(), rewards, fallen, ended, infos
+        return self.task._observed(self._batch), rewards, fallen, ended, infos
 
     def close_extras(self, **kwargs):
         if self._batch is not None:
@@ -215,11 +225,10 @@ class VectorEnvironment(VectorEnv):
         task, batch = self.task, self._batch
         failed = batch.failed
         stopped = np.isin(np.arange(self.num_envs), list(failed))
-        gain, cost = (self._counted() - self._begun).T
-        tilted = np.abs(np.nan_to_num(batch.read(list(task.tilt)))).max(axis=1, initial=0.0) > task.fallen_rad
-        fallen = (stopped | tilted) & ~resting
-        ended = (batch.t >= task.duration_s - 0.5 * self._step_s) & ~fallen & ~resting
-        rewards = np.where(fallen, -1.0, np.where(ended, gain / np.maximum(cost, 1e-9), 0.0))
+        gain, cost = (task._counted(batch) - self._begun).T
+        fallen = (stopped | task._has_fallen(batch)) & ~resting
+        ended = task._is_over(batch) & ~fallen & ~resting
+        rewards = task._reward(fallen, ended, gain, cost)
         own = {k: {"gain": gain[k], "cost": cost[k]} for k in np.flatnonzero(~resting).tolist()}
         for k in own.keys() & failed.keys():
             own[k]["error"] = failed[k]
@@ -239,22 +248,13 @@ class VectorEnvironment(VectorEnv):
             all_seeds = dict(zip(which.tolist(), own))
             first = [all_seeds.get(k, 1) for k in range(self.num_envs)]
             self._batch = Batch(self.task.scenario, self.num_envs, seeds=first, set=dict(self.task.set or {}), threads=self._threads)
-            self._step_s = self._batch.step_s
         else:
             self._batch.restart(which.tolist(), seed=own)
-        self._begun[which], self._over[which] = self._counted()[which], False
+        self._begun[which], self._over[which] = self.task._counted(self._batch)[which], False
         infos = {} if infos is None else infos
         for k, seed in zip(which.tolist(), own):
             infos = self._add_info(infos, {"seed": seed}, k)
         return infos
-
-    def _observed(self):
-        return np.nan_to_num(self._batch.read(list(self.task.observe)))
-
-    def _counted(self):
-        task, batch = self.task, self._batch
-        cost = batch.read(list(task.cost)).sum(axis=1) if task.cost else batch.energy()["actuator_work"]
-        return np.stack([batch.read(list(task.reward)).sum(axis=1), cost], axis=1)
 
 
 #: Scenarios of the package whose `[task]` is registered, and their edits: the rover starts without its time line.

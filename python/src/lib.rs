@@ -10,6 +10,7 @@ mod lock;
 mod members;
 mod names;
 mod observe;
+mod point_cloud;
 mod recording;
 mod run;
 mod scenario;

@@ -4,6 +4,7 @@ use crate::errors::{Refusal, Refused};
 use crate::ground::{self, Heights};
 use crate::lock::locked;
 use crate::observe::{self, Observation};
+use crate::point_cloud;
 use crate::run::Run;
 use crate::scenario::{load, module_paths, value_of};
 use crate::snapshot::Snapshot;
@@ -45,6 +46,29 @@ impl Testbed {
             None => Err(Refusal::Ended("the testbed")),
         };
         done.map_err(|refusal| refusal.raise(py))
+    }
+
+    /// The newest message of a stream whose schema is accepted.
+    fn newest(
+        &self,
+        py: Python<'_>,
+        stream: &str,
+        accepts: impl Fn(&str) -> Refused<()>,
+    ) -> PyResult<Option<(f64, Vec<u8>)>> {
+        self.with(py, |run| {
+            let found = run.testbed.view(|view| {
+                let own = view.streams.iter().find(|s| s.name == stream);
+                own.map(|s| accepts(&s.info.schema).map(|()| s.messages.last().cloned()))
+            });
+            found.unwrap_or_else(|| {
+                let near = did_you_mean(
+                    stream,
+                    run.testbed.signals().directory.streams().iter().map(String::as_str),
+                );
+                let near = near.map(|near| format!("; {near}")).unwrap_or_default();
+                Err(Refusal::Unknown(format!("there is no stream `{stream}`{near}")))
+            })
+        })
     }
 
     /// Steps in slices of wall time, between which Python checks for signals, until all are done.
@@ -288,20 +312,16 @@ impl Testbed {
 
     /// The newest message of a stream in the last step: time (s) and bytes; None: the step made none.
     fn message(&self, py: Python<'_>, stream: &str) -> PyResult<Option<(f64, Vec<u8>)>> {
-        self.with(py, |run| {
-            let found = run.testbed.view(|view| {
-                let own = view.streams.iter().find(|s| s.name == stream);
-                own.map(|s| s.messages.last().cloned())
-            });
-            found.ok_or_else(|| {
-                let near = did_you_mean(
-                    stream,
-                    run.testbed.signals().directory.streams().iter().map(String::as_str),
-                );
-                let near = near.map(|near| format!("; {near}")).unwrap_or_default();
-                Refusal::Unknown(format!("there is no stream `{stream}`{near}"))
-            })
-        })
+        self.newest(py, stream, |_| Ok(()))
+    }
+
+    /// The same of a stream of `foxglove.PointCloud`, as an array with a field for each number of a point.
+    fn points<'py>(&self, py: Python<'py>, stream: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let message = self.newest(py, stream, |schema| match schema {
+            point_cloud::SCHEMA => Ok(()),
+            _ => Err(Refusal::Input(format!("`{stream}` has no points: its messages are {schema}"))),
+        })?;
+        message.map(|(t_s, bytes)| point_cloud::array(py, (stream, t_s), &bytes)).transpose()
     }
 
     /// Energies of all subsystems together, J.

@@ -11,6 +11,7 @@ from . import errors
 from ._terraglue import Batch, Observation, Recording, Snapshot, Testbed, matching, version
 from .commands import check_module, compare, export_fmu, fit_soil
 from .errors import Error, InputError, ModuleError, SimulationError, UnknownName
+from .frames import PointCloud
 from .page import Page, serve
 from .paths import MODELS, PROGRAM, SCENARIOS
 from .program import run
@@ -26,6 +27,7 @@ __all__ = [
     "Observation",
     "PROGRAM",
     "Page",
+    "PointCloud",
     "Recording",
     "SCENARIOS",
     "SimulationError",

@@ -1,9 +1,38 @@
 """Recordings as tables of pandas and data sets of xarray, and the ground over time. Both packages are optional."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ._terraglue import matching
 from .errors import Error
+
+
+class PointCloud(NamedTuple):
+    """The points of one message of a scanner, in its own frame."""
+
+    #: Time of the message, s.
+    t: float
+    #: The body that the scanner sits on, `subsystem/body`.
+    frame: str
+    #: Place of the scanner on it, m.
+    position: np.ndarray
+    #: Its orientation there, quaternion w, x, y, z.
+    orientation: np.ndarray
+    #: A structured array with the fields of the message: `data["x"]`, m, `data["intensity"]`, …
+    data: np.ndarray
+
+    @property
+    def xyz(self):
+        """Places in the frame of the scanner, a row for each point, m."""
+        return np.stack([self.data[axis] for axis in "xyz"], axis=-1)
+
+    @classmethod
+    def _of(cls, head, fields, stride, data):
+        names, formats, offsets = zip(*fields) if fields else ((), (), ())
+        layout = np.dtype({"names": list(names), "formats": list(formats), "offsets": list(offsets), "itemsize": stride})
+        t, frame, position, orientation = head
+        return cls(t, frame, np.array(position), np.array(orientation), np.frombuffer(data, dtype=layout))
 
 
 class GroundSeries:

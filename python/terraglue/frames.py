@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._terraglue import matching
-from .errors import Error
+from .errors import Error, InputError
 
 
 class PointCloud(NamedTuple):
@@ -30,9 +30,13 @@ class PointCloud(NamedTuple):
     @classmethod
     def _of(cls, head, fields, stride, data):
         names, formats, offsets = zip(*fields) if fields else ((), (), ())
-        layout = np.dtype({"names": list(names), "formats": list(formats), "offsets": list(offsets), "itemsize": stride})
         t, frame, position, orientation = head
-        return cls(t, frame, np.array(position), np.array(orientation), np.frombuffer(data, dtype=layout))
+        try:
+            layout = np.dtype({"names": list(names), "formats": list(formats), "offsets": list(offsets), "itemsize": stride})
+            points = np.frombuffer(data, dtype=layout)
+        except ValueError as error:
+            raise InputError(f"the points of {frame} at t = {t} s are not those that their fields describe: {error}") from None
+        return cls(t, frame, np.array(position), np.array(orientation), points)
 
 
 class GroundSeries:

@@ -44,3 +44,11 @@ def test_streams_without_points_are_named(tg):
     with tg.Testbed(stand) as testbed:
         with pytest.raises(tg.InputError, match="terraglue.TreeMap"):
             testbed.points("stand.map")
+
+
+def test_a_message_that_contradicts_itself_is_an_error(tg):
+    head = (0.5, "robot/body", [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])
+    assert len(tg.PointCloud._of(head, [("x", "<f4", 0)], 8, b"").data) == 0
+    for fields, stride, data in [([("x", "<f4", 0)], 8, b"1234567"), ([("x", "<f4", 6)], 8, b"12345678"), ([("x", "<f4", 0), ("x", "<f4", 4)], 8, b"12345678")]:
+        with pytest.raises(tg.InputError, match="t = 0.5 s"):
+            tg.PointCloud._of(head, fields, stride, data)

@@ -156,7 +156,7 @@ class Row {
       event.stopPropagation();
     };
     input.oninput = () => { this.editing = true; };
-    input.onblur = () => { if (this.editing) this.edit(input.value); };
+    input.onblur = () => { if (this.editing) this.edit(input.value); else this.show(true); };
     return input;
   }
 
@@ -183,9 +183,9 @@ class Row {
     this.show(true);
   }
 
-  /** Shows the value as it is, not while it is edited. */
+  /** Shows the value as it is, not in a field that has the focus: what is selected or typed there would be lost. */
   show(force = false) {
-    if (!force && (this.editing || (document.activeElement === this.field && this.field.tagName === "SELECT"))) return;
+    if (!force && (this.editing || document.activeElement === this.field)) return;
     const value = this.run.values.get(this.variable.id);
     const text = textOf(this.variable, value);
     if ("value" in this.field) this.field.value = text; else this.field.textContent = text;

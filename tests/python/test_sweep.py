@@ -1,6 +1,7 @@
 """Sweeps: the same table whatever ran the cases and was killed between, and plans that do not fit."""
 
 import csv
+import fcntl
 import hashlib
 import json
 import os
@@ -148,11 +149,35 @@ def test_values_that_do_not_fit_are_cases_that_say_so(tmp_path):
 def test_several_processes_share_a_sweep(whole, tmp_path):
     listed(tmp_path)
     both = [subprocess.Popen([PROGRAM, "sweep", "run", "sweep", "-j", "2", "--quiet"], cwd=tmp_path, stdout=subprocess.DEVNULL) for _ in range(2)]
-    assert {process.wait() for process in both} <= {0, 1}
-    # one may have ended while the other still ran its last cases
-    assert terraglue("sweep", "collect", "sweep", cwd=tmp_path).returncode == 0
+    # whoever is ready first waits for the last cases of the other
+    assert [process.wait() for process in both] == [0, 0]
     assert (tmp_path / "sweep/sweep.csv").read_bytes() == whole[1] and recordings(tmp_path) == recordings(whole[0])
     assert not list(tmp_path.glob("sweep/cases/*.lock"))
+
+
+def test_a_case_that_another_process_runs_is_waited_for(whole, tmp_path):
+    listed(tmp_path)
+    (tmp_path / "sweep/cases").mkdir(exist_ok=True)
+    with open(tmp_path / "sweep/cases/0001.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        task = terraglue("sweep", "run", "sweep", "--case", "1", cwd=tmp_path)
+        assert task.returncode == 75 and "another process runs case 1" in task.stderr
+        process = subprocess.Popen([PROGRAM, "sweep", "run", "sweep", "-j", "2", "--quiet"], cwd=tmp_path)
+        while len(list(tmp_path.glob("sweep/cases/*/case.json"))) < 15:
+            assert process.poll() is None
+            time.sleep(0.01)
+        assert process.poll() is None and not (tmp_path / "sweep/cases/0001/case.json").exists()
+    # whoever had it has ended without a result
+    assert process.wait(timeout=300) == 0
+    assert (tmp_path / "sweep/sweep.csv").read_bytes() == whole[1]
+
+
+def test_a_case_does_not_outlive_the_process_that_started_it(tmp_path):
+    listed(tmp_path)
+    gone = subprocess.Popen(["true"])
+    gone.wait()
+    task = terraglue("sweep", "run", "sweep", "--case", "1", "--with-parent", str(gone.pid), cwd=tmp_path)
+    assert task.returncode == 130 and not list(tmp_path.glob("sweep/cases/*"))
 
 
 def test_ctrl_c_leaves_what_is_done_and_no_process(tmp_path):

@@ -7,7 +7,7 @@
 use super::Exit;
 use super::arguments::FmuRunArguments;
 use super::interrupt::Interrupt;
-use rustix::process::{Signal, set_parent_process_death_signal};
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::fs::File;
 use std::io::{PipeReader, PipeWriter, Read, Write};
 use std::os::unix::fs::FileExt;
@@ -29,6 +29,9 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Variable with the file that a command writes when it has done all of its work.
 const DONE: &str = "TERRAGLUE_DONE";
 
+/// Variable with the number of the process that waits for the command.
+const PARENT: &str = "TERRAGLUE_PARENT";
+
 /// Whether another process waits for this one and reports how it ended.
 pub fn is_child() -> bool {
     std::env::var_os(DONE).is_some()
@@ -40,10 +43,18 @@ pub fn own_program() -> PathBuf {
     own.unwrap_or_else(|| "/proc/self/exe".into())
 }
 
-/// Ends with the process that waits for this one, whatever ends it.
-pub fn end_with_parent() {
+/// Ends with the process `parent` that waits for this one, whatever ends it; false: it has ended already.
+#[must_use]
+pub fn end_with_parent(parent: Option<Pid>) -> bool {
     // Where the system does not know it, a signal to the group ends both.
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    // a parent that ended before the call above sends no signal
+    getppid() == parent
+}
+
+/// The process that waits for this one, where another one does.
+pub fn parent() -> Option<Pid> {
+    std::env::var(PARENT).ok()?.parse().ok().and_then(Pid::from_raw)
 }
 
 /// Notifies the process that waits for this one, if there is one, that all work and output is done, with this exit code.
@@ -126,6 +137,7 @@ fn started(folder: &Path, rows: PipeWriter) -> std::io::Result<Child> {
         .args(std::env::args_os().skip(1).filter(|word| word != "--isolate"))
         .env("TMPDIR", folder)
         .env(DONE, folder.join(DONE))
+        .env(PARENT, std::process::id().to_string())
         .stdin(rows)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

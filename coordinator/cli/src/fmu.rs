@@ -39,7 +39,9 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let interrupt = Interrupt::listen();
     let stopped = interrupt.flag();
     if apart::is_child() {
-        apart::end_with_parent();
+        if !apart::end_with_parent(apart::parent()) {
+            return Ok(Exit::Interrupted);
+        }
         confine(arguments.memory_mb.saturating_mul(1 << 20));
     }
     let fmu = Fmu::open(&arguments.fmu).map_err(input)?;

@@ -53,6 +53,9 @@ use std::process::ExitCode;
 use terraglue_diagnostics::Error;
 use terraglue_host::{crash, descendants, exit_guard};
 
+/// Exit code of a command that another process runs: EX_TEMPFAIL of `sysexits.h`, a temporary failure.
+const ELSEWHERE: u8 = 75;
+
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
@@ -64,6 +67,8 @@ pub enum Exit {
     WrongInput,
     /// The user stopped it; the recording is closed.
     Interrupted,
+    /// Another process does it now; later it can be tried again.
+    Elsewhere,
 }
 
 impl Exit {
@@ -74,6 +79,7 @@ impl Exit {
             Self::Failed => 1,
             Self::WrongInput => 2,
             Self::Interrupted => 130,
+            Self::Elsewhere => ELSEWHERE,
         }
     }
 }

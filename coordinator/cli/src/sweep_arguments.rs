@@ -71,7 +71,7 @@ pub struct SweepRunArguments {
     /// No progress bar, no table.
     #[arg(long)]
     pub quiet: bool,
-    /// End with the process that has started this one.
-    #[arg(long, hide = true)]
-    pub with_parent: bool,
+    /// End with the process of this number, which has started this one.
+    #[arg(long, value_name = "PID", hide = true)]
+    pub with_parent: Option<i32>,
 }

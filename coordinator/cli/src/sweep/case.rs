@@ -5,6 +5,7 @@ use crate::progress::{self, Progress, Waiting};
 use crate::show::{self, in_one_line};
 use crate::sweep_arguments::SweepRunArguments;
 use crate::{Exit, apart, exit_of, run, testbed};
+use rustix::process::Pid;
 use std::path::Path;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_recording::Status;
@@ -12,8 +13,10 @@ use terraglue_sweep::{CaseStatus, Claim, Outcome, Sweep, figures};
 
 /// Runs the case that the arguments name; nothing where it is done.
 pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
-    if arguments.with_parent {
-        apart::end_with_parent();
+    if let Some(parent) = arguments.with_parent
+        && !apart::end_with_parent(Pid::from_raw(parent))
+    {
+        return Ok(Exit::Interrupted);
     }
     let interrupt = Interrupt::listen();
     let sweep = Sweep::open(&arguments.folder)?;
@@ -24,7 +27,7 @@ pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
     }
     let Some(_claim) = Claim::take(&sweep, case)? else {
         eprintln!("error: another process runs case {}", case.number);
-        return Ok(Exit::Failed);
+        return Ok(Exit::Elsewhere);
     };
     if Outcome::is_there(&place) {
         return Ok(Exit::Done);

@@ -10,13 +10,17 @@ use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_sweep::{Case, CaseStatus, Claim, Outcome, Sweep};
 
 /// Bytes that are kept of the output of a case.
 const MOST_SAID: u64 = 1 << 18;
 
-/// Runs what is missing, then collects.
+/// How often to look whether another process has ended a case.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Runs what is missing, waits for the cases that other processes run, then collects.
 pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
     let sweep = Sweep::open(&arguments.folder)?;
     if arguments.again {
@@ -37,24 +41,9 @@ pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
         );
     }
     let bar = bar(&sweep, missing.len(), arguments.quiet);
-    let next = Mutex::new(missing.iter());
-    let broken = Mutex::new(None);
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(|| {
-                while !cancel.load(Ordering::Relaxed) {
-                    let Some(case) = next.lock().ok().and_then(|mut next| next.next()) else { break };
-                    if let Err(error) = one(&sweep, case, &cancel) {
-                        broken.lock().iter_mut().for_each(|broken| **broken = Some(error.to_string()));
-                        break;
-                    }
-                    bar.inc(1);
-                }
-            });
-        }
-    });
+    let ran = all(&sweep, missing, jobs, &cancel, &bar);
     bar.finish_and_clear();
-    if let Some(error) = broken.into_inner().ok().flatten() {
+    if let Err(error) = ran {
         eprintln!("error: {error}");
         return Ok(Exit::Failed);
     }
@@ -62,15 +51,67 @@ pub fn run(arguments: &SweepRunArguments) -> Result<Exit> {
         eprintln!("`terraglue sweep run {}` goes on from here", sweep.folder().display());
         return Ok(Exit::Interrupted);
     }
-    let all = super::collected(&sweep, false)?;
-    let unlike = all.rows.len() - all.count("done");
-    if all.missing() > 0 {
-        let n = all.missing();
-        eprintln!(
-            "error: {n} cases were killed, or another process runs them; `terraglue sweep run` does what is missing"
-        );
+    let table = super::collected(&sweep, false)?;
+    let unlike = table.rows.len() - table.count("done");
+    if table.missing() > 0 {
+        let n = table.missing();
+        eprintln!("error: {n} cases were killed; `terraglue sweep run` does what is missing");
     }
     Ok(if unlike > 0 { Exit::Failed } else { Exit::Done })
+}
+
+/// Runs cases, several at a time; those that another process runs come last, when it has ended with them.
+fn all(sweep: &Sweep, missing: Vec<&Case>, jobs: usize, cancel: &AtomicBool, bar: &ProgressBar) -> Result {
+    let waiting: Vec<(&Case, bool)> = missing.into_iter().rev().map(|case| (case, false)).collect();
+    let cases = Mutex::new(waiting);
+    let next = || cases.lock().ok().and_then(|mut cases| cases.pop());
+    let broken = Mutex::new(Ok(()));
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(|| {
+                while let Some((case, taken)) = next().filter(|_| !cancel.load(Ordering::Relaxed)) {
+                    let ran = if taken { waited(sweep, case, cancel) } else { one(sweep, case, cancel) };
+                    match ran {
+                        Ok(Ran::Here) => bar.inc(1),
+                        Ok(Ran::Elsewhere) => {
+                            if !taken {
+                                log::info!(target: "terraglue_sweep", "case {} is run by another process", case.number);
+                            }
+                            if let Ok(mut cases) = cases.lock() {
+                                cases.insert(0, (case, true));
+                            }
+                        }
+                        Err(error) => {
+                            if let Ok(mut broken) = broken.lock() {
+                                *broken = Err(error);
+                            }
+                            break;
+                        }
+                    }
+                }
+            });
+        }
+    });
+    broken.into_inner().unwrap_or(Ok(()))
+}
+
+/// Looks again for a case that another process ran, after a while.
+fn waited(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result<Ran> {
+    std::thread::sleep(LOOK);
+    if Outcome::is_there(&sweep.case_folder(case)) {
+        return Ok(Ran::Here);
+    }
+    let free = Claim::take(sweep, case)?.is_some();
+    if free { one(sweep, case, cancel) } else { Ok(Ran::Elsewhere) }
+}
+
+/// Who has run a case.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ran {
+    /// This process, or nobody needs to.
+    Here,
+    /// Another process runs it now.
+    Elsewhere,
 }
 
 fn bar(sweep: &Sweep, missing: usize, quiet: bool) -> ProgressBar {
@@ -98,12 +139,14 @@ fn forget_failed(sweep: &Sweep) -> Result {
 }
 
 /// Runs a case in a process. A crash is its outcome; where it was killed it stays missing.
-fn one(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result {
+fn one(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result<Ran> {
+    let folder = sweep.case_folder(case);
     let failed = |source| Error::File { path: format!("the process of case {}", case.number), source };
     let mut child = Command::new(apart::own_program())
         .args(["sweep", "run"])
         .arg(sweep.folder())
-        .args(["--case", &case.number.to_string(), "--quiet", "--with-parent"])
+        .args(["--case", &case.number.to_string(), "--quiet"])
+        .args(["--with-parent", &std::process::id().to_string()])
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -116,7 +159,9 @@ fn one(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result {
         let _ = kept.and_then(|_| std::io::copy(&mut pipe, &mut std::io::sink()));
     }
     let status = child.wait().map_err(failed)?;
-    let folder = sweep.case_folder(case);
+    if status.code() == Some(Exit::Elsewhere.code().into()) {
+        return Ok(Ran::Elsewhere);
+    }
     let said = String::from_utf8_lossy(&said);
     if !said.is_empty() && folder.is_dir() {
         let path = folder.join("log.txt");
@@ -124,13 +169,14 @@ fn one(sweep: &Sweep, case: &Case, cancel: &AtomicBool) -> Result {
             .map_err(|source| Error::File { path: path.display().to_string(), source })?;
     }
     if Outcome::is_there(&folder) || cancel.load(Ordering::Relaxed) || was_killed(status) {
-        return Ok(());
+        return Ok(Ran::Here);
     }
-    let Some(_claim) = Claim::take(sweep, case)? else { return Ok(()) };
+    let Some(_claim) = Claim::take(sweep, case)? else { return Ok(Ran::Elsewhere) };
     let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default();
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let reason = format!("the process ended without a result ({status}): {last}");
-    Outcome::without_figures(CaseStatus::Crashed, reason).write(&folder)
+    Outcome::without_figures(CaseStatus::Crashed, reason).write(&folder)?;
+    Ok(Ran::Here)
 }
 
 /// Whether someone ended the process, and not a fault of its own.

@@ -16,6 +16,7 @@ from .page import Page, serve
 from .paths import MODELS, PROGRAM, SCENARIOS
 from .program import run
 from .soil import Soil
+from .sweeps import Sweep, sweep
 
 __version__ = version()
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "SimulationError",
     "Snapshot",
     "Soil",
+    "Sweep",
     "Testbed",
     "UnknownName",
     "check_module",
@@ -43,5 +45,6 @@ __all__ = [
     "matching",
     "run",
     "serve",
+    "sweep",
     "version",
 ]

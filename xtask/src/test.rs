@@ -10,7 +10,7 @@ pub fn test() -> Outcome {
     must(&mut cargo(&["test", "--workspace", "--no-fail-fast"]))?;
     let python = virtual_environment()?;
     // a file is the work of one process: its tests share its fixtures
-    let in_parallel = ["-n", "auto", "--maxprocesses", "4", "--dist", "loadfile"];
+    let in_parallel = ["-n", "auto", "--maxprocesses", "4", "--dist", "loadfile", "--durations", "20"];
     let tests = [&["-m", "pytest", "-q", "tests/python"], &in_parallel[..]].concat();
     must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;
     must(&mut validation(&["validate", "--quick", "--check-docs"]))
@@ -21,28 +21,23 @@ pub fn virtual_environment() -> Outcome<PathBuf> {
     let venv = target().join("venv");
     let python = venv.join("bin/python");
     let requirements = root().join("tests/python/requirements.txt");
-    let wanted = read(&requirements)?;
+    // Large wheels that not every platform has; tests that need one are skipped with a reason.
+    let optional = root().join("tests/python/requirements-optional.txt");
+    let wanted = read(&requirements)? + &read(&optional)?;
     let stamp = venv.join("requirements.txt");
     if python.is_file() && std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
         return Ok(python);
     }
     make(&venv)?;
-    let file = requirements.display().to_string();
-    must(&mut command(
-        &python,
-        &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", &file],
-    ))?;
-    // Large wheels that not every platform has; tests that need one are skipped with a reason.
-    let optional = root().join("tests/python/requirements-optional.txt").display().to_string();
-    let installed = command(
-        &python,
-        &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", &optional],
-    )
-    .status();
-    if !installed.is_ok_and(|status| status.success()) {
-        eprintln!(
-            "tests/python/requirements-optional.txt cannot be installed; the tests that need it are skipped"
-        );
+    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+    let pip = |what: &[&str]| must(&mut command(&python, &[&install[..], what].concat()));
+    pip(&["-r", &requirements.display().to_string()])?;
+    if pip(&["-r", &optional.display().to_string()]).is_err() {
+        for package in read(&optional)?.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
+            if pip(&[package]).is_err() {
+                eprintln!("{package} cannot be installed; the tests that need it are skipped");
+            }
+        }
     }
     write(&stamp, &wanted)?;
     Ok(python)

@@ -35,14 +35,17 @@ fn input(message: impl ToString) -> Error {
     InputError::plain(message, help).into()
 }
 
+/// Bounds this process, which ends with the one that waits for it; false: that one has ended.
+fn is_confined(arguments: &FmuRunArguments) -> bool {
+    confine(arguments.memory_mb.saturating_mul(1 << 20));
+    apart::end_with_parent(apart::parent())
+}
+
 fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let interrupt = Interrupt::listen();
     let stopped = interrupt.flag();
-    if apart::is_child() {
-        if !apart::end_with_parent(apart::parent()) {
-            return Ok(Exit::Interrupted);
-        }
-        confine(arguments.memory_mb.saturating_mul(1 << 20));
+    if apart::is_child() && !is_confined(arguments) {
+        return Ok(Exit::Interrupted);
     }
     let fmu = Fmu::open(&arguments.fmu).map_err(input)?;
     let settings = settings(arguments)?;

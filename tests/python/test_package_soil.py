@@ -1,6 +1,7 @@
 """The soil of the Python package for dynamics of one's own, and its examples."""
 
 import importlib.util
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -131,3 +132,27 @@ def test_a_search_for_a_gait_returns_what_it_has_measured(tg):
     assert first.shape == (2,) and np.isfinite(first).all()
     best, lowest = gait.search(generations=1, population=3, **short)
     assert lowest == gait.cost(best[:, None], **short)[0]
+
+
+def test_optuna_asks_for_gaits_and_is_told_what_they_need(tg, monkeypatch):
+    pytest.importorskip("optuna", reason="optuna is not installed: pip install optuna")
+    pytest.importorskip("scipy", reason="scipy is not installed: pip install scipy")
+    monkeypatch.syspath_prepend(ROOT / "examples/python")
+    short = {"until_s": 0.4, "set": {"gait.stand_s": 0.0, "gait.ramp_s": 0.1, "terrain.size_m": [3.0, 1.6], "terrain.spacing_m": 0.02}}
+    study = example("gait_with_optuna").search(rounds=2, at_once=3, **short)
+    told = [trial.value for trial in study.trials]
+    assert len(told) == 6 and study.best_value == min(told)
+    best = np.array([[value] for value in study.best_params.values()])
+    assert example("gait_for_energy").cost(best, **short)[0] == study.best_value
+
+
+def test_indices_of_sobol_find_what_a_result_follows(tg, tmp_path):
+    pytest.importorskip("SALib", reason="SALib is not installed: pip install SALib")
+    study = example("soil_or_method")
+    # the load of the wheel decides, the step does not
+    study.FACTORS = [("load", "rig.torque_target.press", (20.0, 90.0)), ("step", "time.step_s", [0.001, 0.0005])]
+    with ThreadPoolExecutor(2) as executor:
+        problem, found = study.indices(8, tmp_path, duration_s=0.1, executor=executor)
+    index = found["soil.contact1.sinkage"]
+    assert problem["groups"] == ["load", "step"]
+    assert index["ST"][0] > 0.9 and abs(index["ST"][1]) < 0.05

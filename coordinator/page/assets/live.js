@@ -105,7 +105,7 @@ function start() {
     if (wish.get("camera") ?? camera) stage.view.camera.text = wish.get("camera") ?? camera;
     if (ground) stage.view.colour(ground);
     if (layers) stage.view.menus.show(layers);
-    if (wish.has("t")) run.look(Number(wish.get("t")));
+    if (wish.has("t")) timeline.restore(Number(wish.get("t")));
     document.documentElement.dataset.ready = "yes";
     stage.mark();
   });
@@ -114,7 +114,7 @@ function start() {
   keepAddress(run, stage, scope);
   // for scripts that drive the page
   document.addEventListener("terraglue:frames", (event) => event.detail(stage?.view.frames ?? 0));
-  document.addEventListener("terraglue:busy", (event) => event.detail(stage?.busy ?? false));
+  document.addEventListener("terraglue:busy", (event) => event.detail(Boolean(stage?.busy || stage?.scaling)));
 }
 
 start();

@@ -112,8 +112,9 @@ export class Stage {
 
   takeGround(message) {
     this.queue = this.queue.then(() => takeTiles(message, this.view.relief, this.lattice)).then(() => {
-      const now = performance.now();
-      if (now - this.scaled > RESCALE_MS) { this.scaled = now; this.view.rescale(true); }
+      // not for each of many tiles, but always after the last one
+      const wait = Math.max(this.scaled + RESCALE_MS - performance.now(), 0);
+      this.scaling ??= setTimeout(() => { this.scaling = null; this.scaled = performance.now(); this.view.rescale(true); }, wait);
       this.view.invalidate();
     }).catch((error) => this.run.say(`ground: ${error.message}`, true));
     return this.queue;

@@ -74,6 +74,13 @@ export class Timeline {
     else this.run.look(at >= state.t_s - 1e-9 && t >= to ? null : at);
   }
 
+  /** Looks at a time from an address, where the run has reached it. */
+  restore(t) {
+    const { run } = this;
+    if (!run.state) run.addEventListener("run", () => this.restore(t), { once: true });
+    else if (t < Math.max(run.state.recorded_to_s ?? 0, run.state.t_s)) run.look(t);
+  }
+
   async branch() {
     const { looked, state } = this.run;
     if (looked === null) return;

@@ -25,7 +25,8 @@ class Sweep:
         self.folder = pathlib.Path(folder)
         if not (self.folder / "sweep.json").is_file():
             raise InputError(f"{self.folder}: there is no sweep in this folder; terraglue.sweep(plan, folder) makes one")
-        self._count = sum(1 for _ in self._numbers())
+        with open(self.folder / "cases.tsv", newline="", encoding="utf-8") as file:
+            self._numbers = [int(row["case"]) for row in csv.DictReader(file, delimiter="\t")]
 
     @classmethod
     def create(cls, plan, folder, *, set=None):
@@ -51,9 +52,9 @@ class Sweep:
             shown = None if sys.stderr.isatty() else subprocess.DEVNULL
             subprocess.run([PROGRAM, "sweep", "run", self.folder, *options], stdout=subprocess.DEVNULL, stderr=shown)
         else:
-            for number, status in self._cases() if again else ():
-                if status not in ("done", "missing"):
-                    (self._folder(number) / "case.json").unlink()
+            for path, status in self._results() if again else ():
+                if status != "done":
+                    path.unlink()
             self._submit(executor)
         counts = self.collect()
         if counts["missing"]:
@@ -73,24 +74,13 @@ class Sweep:
             for future in futures:
                 future.cancel()
 
-    def _numbers(self):
-        with open(self.folder / "cases.tsv", newline="", encoding="utf-8") as file:
-            yield from (int(row["case"]) for row in csv.DictReader(file, delimiter="\t"))
-
-    def _cases(self):
-        """Number and status of each case, as the files are now."""
-        for number in self._numbers():
-            try:
-                yield number, json.loads((self._folder(number) / "case.json").read_text(encoding="utf-8"))["status"]
-            except FileNotFoundError:
-                yield number, "missing"
-
-    def _folder(self, number):
-        # all names have one length
-        return self.folder / "cases" / str(number).zfill(max(4, len(str(len(self)))))
+    def _results(self):
+        """File and status of each case that has a result."""
+        for path in self.folder.glob("cases/*/case.json"):
+            yield path, json.loads(path.read_text(encoding="utf-8"))["status"]
 
     def __len__(self):
-        return self._count
+        return len(self._numbers)
 
     def __repr__(self):
         return f"Sweep({os.fspath(self.folder)!r}, {len(self)} cases, {len(self.missing)} missing)"
@@ -98,7 +88,8 @@ class Sweep:
     @property
     def missing(self):
         """Numbers of the cases that are still to be run."""
-        return [number for number, status in self._cases() if status == "missing"]
+        found = {int(path.parent.name) for path in self.folder.glob("cases/*/case.json")}
+        return [number for number in self._numbers if number not in found]
 
     def collect(self):
         """Writes `sweep.csv` and `sweep.html` from what is there; the number of cases by status."""

@@ -51,7 +51,8 @@ def free_ports(count):
 @pytest.fixture
 def slurm():
     """Environment in which `sbatch` reaches a cluster of two nodes."""
-    missing = [name for name in ("slurmctld", "slurmd", "sbatch", "sinfo") if shutil.which(name, path=os.environ["PATH"] + ":/usr/sbin") is None]
+    path = os.environ["PATH"] + ":/usr/sbin"
+    missing = [name for name in ("slurmctld", "slurmd", "sbatch", "sinfo") if shutil.which(name, path=path) is None]
     if missing:
         pytest.skip(f"no {missing[0]}: apt-get install slurm-wlm")
     # the names of its sockets may have 108 characters
@@ -61,7 +62,7 @@ def slurm():
     text = CONFIGURATION.format(host=socket.gethostname().split(".")[0], user=pwd.getpwuid(os.geteuid()).pw_name, folder=folder, ports=free_ports(3))
     (folder / "slurm.conf").write_text(text)
     (folder / "cgroup.conf").write_text(f"CgroupPlugin=cgroup/v1\nCgroupMountpoint={folder}/cgroup\nCgroupAutomount=yes\n")
-    environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf"), "PATH": os.environ["PATH"] + ":/usr/sbin"}
+    environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf"), "PATH": path}
     start = lambda *command: subprocess.Popen([*command, "-D"], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     daemons = [start("slurmctld"), start("slurmd", "-N", "n1"), start("slurmd", "-N", "n2")]
     try:

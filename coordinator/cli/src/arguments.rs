@@ -29,7 +29,7 @@ Examples:
   terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative
   terraglue variables scenarios/moon_walk.toml
 
-Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.
+Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 75 another process does it, 130 interrupted.
 TERRAGLUE_LOG=info shows which modules are loaded and what they say; TERRAGLUE_MODULE_PATH adds folders with modules.";
 
 /// The commands.

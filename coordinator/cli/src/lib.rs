@@ -1,6 +1,6 @@
 //! The command line. No simulation logic: it reads arguments, drives the library and prints.
 //!
-//! Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.
+//! Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 75 another process does it, 130 interrupted.
 
 mod apart;
 mod arguments;
@@ -53,9 +53,6 @@ use std::process::ExitCode;
 use terraglue_diagnostics::Error;
 use terraglue_host::{crash, descendants, exit_guard};
 
-/// Exit code of a command that another process runs: EX_TEMPFAIL of `sysexits.h`, a temporary failure.
-const ELSEWHERE: u8 = 75;
-
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
@@ -79,7 +76,8 @@ impl Exit {
             Self::Failed => 1,
             Self::WrongInput => 2,
             Self::Interrupted => 130,
-            Self::Elsewhere => ELSEWHERE,
+            // EX_TEMPFAIL of sysexits.h, a temporary failure
+            Self::Elsewhere => 75,
         }
     }
 }

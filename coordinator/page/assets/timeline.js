@@ -34,10 +34,12 @@ export class Timeline {
     new ResizeObserver(() => { this.drawn = ""; this.draw(); }).observe(this.track);
   }
 
+  /** End of what can be looked at, s. */
+  get reached() { const { state } = this.run; return Math.max(state?.recorded_to_s ?? 0, state?.t_s ?? 0); }
+
   get range() {
-    const state = this.run.state;
-    const end = Math.max(state?.recorded_to_s ?? 0, state?.t_s ?? 0);
-    return [0, Math.max(Number.isFinite(state?.duration_s) ? state.duration_s : 0, end, 1e-3)];
+    const { state } = this.run;
+    return [0, Math.max(Number.isFinite(state?.duration_s) ? state.duration_s : 0, this.reached, 1e-3)];
   }
 
   share(t) { const [low, high] = this.range; return Math.min(Math.max((t - low) / (high - low), 0), 1); }
@@ -68,7 +70,7 @@ export class Timeline {
   seek(t) {
     const { state } = this.run;
     if (!state) return;
-    const [from, to] = [state.recorded_from_s ?? 0, Math.max(state.recorded_to_s ?? 0, state.t_s)];
+    const [from, to] = [state.recorded_from_s ?? 0, this.reached];
     const at = Math.min(Math.max(t, from), to);
     if (this.run.replaying) this.run.act("run.seek", { t_s: at });
     else this.run.look(at >= state.t_s - 1e-9 && t >= to ? null : at);
@@ -78,7 +80,7 @@ export class Timeline {
   restore(t) {
     const { run } = this;
     if (!run.state) run.addEventListener("run", () => this.restore(t), { once: true });
-    else if (t < Math.max(run.state.recorded_to_s ?? 0, run.state.t_s)) run.look(t);
+    else if (t < this.reached) run.look(t);
   }
 
   async branch() {
@@ -92,7 +94,7 @@ export class Timeline {
     const { state, looked } = this.run;
     if (!state) return;
     const percent = (t) => `${100 * this.share(t)}%`;
-    const [from, to] = [state.recorded_from_s ?? 0, Math.max(state.recorded_to_s ?? 0, state.t_s)];
+    const [from, to] = [state.recorded_from_s ?? 0, this.reached];
     Object.assign(this.done.style, { left: percent(from), width: `${100 * (this.share(to) - this.share(from))}%` });
     this.cursor.style.left = percent(this.run.shown);
     this.cursor.classList.toggle("past", looked !== null);

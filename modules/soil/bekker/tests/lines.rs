@@ -35,7 +35,7 @@ fn off(body: &Body, spacing: f64) -> f64 {
 fn narrow_contacts_sink_alike_on_all_grids() {
     // an edge that touches 5 mm, half a cell or a whole one; a capsule that touches 10 mm; a corner 45 mm broad; a ball of 25 mm
     let cases: [(&str, Body, [f64; 2]); 4] = [
-        ("edge", edge(), [0.15, 0.07]),
+        ("edge", edge(), [0.15, 0.08]),
         ("capsule", capsule(), [0.05, 0.04]),
         ("corner", corner(), [0.09, 0.02]),
         ("ball", ball(), [0.03, 0.015]),

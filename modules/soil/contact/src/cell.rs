@@ -137,8 +137,9 @@ impl PatchNodes {
         let (at, weight) = (rows.cell(self.index[k]), rows.weight(k));
         let seen = |steps: [i32; 2]| {
             let next = rows.beside(at, steps)?;
-            let (plane, weight) = (self.plane[next].seen(steps, spacing), weight * rows.weight(next));
-            Some(Neighbour { plane, weight, edge: over_border(&own, &plane, weight, spacing) })
+            let (plane, others) = (self.plane[next].seen(steps, spacing), rows.weight(next));
+            let edge = over_border(&own, &plane, others, spacing);
+            Some(Neighbour { plane, weight: weight * others, edge })
         };
         // written out, since `map` copies
         let mut beside = [const { None }; 4];
@@ -183,7 +184,8 @@ impl PatchNodes {
 }
 
 /// The plane of a neighbour that with the plane of the node bounds a convex body whose edge crosses the cell of the node. It comes in
-/// where the edge crosses the border of the cell, not all at once. `weight`: that of both planes.
+/// where the edge crosses the border of the cell, not all at once. `weight`: that of the neighbour's slope; a face reaches into the
+/// cell of a side beside it, however steep that is.
 fn over_border(own: &Plane, other: &Plane, weight: f64, spacing: f64) -> Option<Edge> {
     let change = [0, 1].map(|c| (other.slope[c] - own.slope[c]).abs());
     let most = spacing * (change[0] + change[1]);

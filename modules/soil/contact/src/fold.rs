@@ -79,8 +79,7 @@ impl Fold {
             }
         }
         let ground = heights(&Plane { height: own.height, slope: self.ground }, &place);
-        let (mut sum, mut rise, mut square, mut slope, mut stretch, mut weights) =
-            (0.0, 0.0, 0.0, [0.0; 2], 0.0, 0.0);
+        let (mut sum, mut rise, mut square, mut stretch, mut weights) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for s in 0..POINTS {
             let face = &faces[highest[s]];
             let over = top[s] - ground[s];
@@ -88,12 +87,11 @@ impl Fold {
             rise += top[s] - own.height;
             square += over * over;
             let weight = (face.inside[0] + (level - over) * face.inside[1]).clamp(0.0, 1.0) + OUTSIDE;
-            slope = [slope[0] + weight * face.slope[0], slope[1] + weight * face.slope[1]];
             stretch += weight * face.stretch;
             weights += weight;
         }
         let count = POINTS as f64;
-        let (mean, [a, b]) = (sum / count, slope.map(|s| s / weights));
+        let (mean, [a, b]) = (sum / count, [0, 1].map(|axis| self.mean_slope(axis, &place, level)));
         Underside {
             rise: rise / count,
             variance: (square / count - mean * mean).max(0.0) * MIDPOINTS * MIDPOINTS,
@@ -102,18 +100,50 @@ impl Fold {
         }
     }
 
+    /// Mean slope along an axis of the part in the soil, on lines at `place`: how much the underside rises from where it enters the soil
+    /// to where it leaves it. Summed over cells, what rises and what falls again cancel, so that soil at one pressure does not
+    /// push a level sole aside, whatever its sides look like.
+    fn mean_slope(&self, axis: usize, place: &[f64; SAMPLES], level: f64) -> f64 {
+        let half = 0.5 * self.spacing;
+        let (mut rises, mut length) = (0.0, 0.0);
+        for across in place {
+            let (mut low, mut high, mut ends) = (-half, half, [f64::NEG_INFINITY; 2]);
+            for plane in &self.planes[..self.count] {
+                let tilt = [0, 1].map(|c| plane.slope[c] - self.ground[c]);
+                let (along, at) =
+                    (tilt[axis], plane.height - self.planes[0].height + tilt[1 - axis] * across);
+                ends = [ends[0].max(at - along * half), ends[1].max(at + along * half)];
+                let below = level - at;
+                if along > 0.0 {
+                    high = high.min(below / along);
+                } else if along < 0.0 {
+                    low = low.max(below / along);
+                } else if below < 0.0 {
+                    high = f64::NEG_INFINITY;
+                }
+            }
+            if high > low {
+                rises +=
+                    if high < half { level } else { ends[1] } - if low > -half { level } else { ends[0] };
+                length += high - low;
+            }
+            rises += OUTSIDE * (ends[1] - ends[0]);
+            length += OUTSIDE * self.spacing;
+        }
+        self.ground[axis] + rises / length
+    }
+
     fn face(&self, plane: &Plane) -> Face {
         let [a, b] = plane.slope;
         let falls = ((a - self.ground[0]).abs() + (b - self.ground[1]).abs()) * self.spacing / SAMPLES as f64;
         let inside = if falls > 0.0 { [0.5, 1.0 / falls] } else { [1.0, 0.0] };
-        Face { slope: [a, b], stretch: (1.0 + a * a + b * b).sqrt(), inside }
+        Face { stretch: (1.0 + a * a + b * b).sqrt(), inside }
     }
 }
 
 /// Contribution of a face of an underside at each point.
 #[derive(Clone, Copy, Default)]
 struct Face {
-    slope: [f64; 2],
     /// √(1 + slope²).
     stretch: f64,
     /// Part of the cell around a point that is in the soil where the point lies at its level, and its change with the height, 1/m: one

@@ -141,6 +141,8 @@ pub struct Patches {
     /// Whether something is.
     pub prints: bool,
     rows: Rows,
+    /// Nodes of each port.
+    ranges: Vec<std::ops::Range<usize>>,
     built_for: Option<(u64, u64, usize, usize)>,
 }
 
@@ -183,11 +185,16 @@ impl Patches {
         self.laws.clear();
         self.sides.clear();
         self.prints = false;
+        self.ranges.clear();
         for port in step.ports {
-            let patch = self.read_port(port, step, ground, laws)?;
+            let range = read_nodes(&mut self.nodes, port, step, ground, laws);
+            self.ranges.push(range);
+        }
+        self.share_nodes(step, ground, laws);
+        for (number, port) in step.ports.iter().enumerate() {
+            let patch = self.read_port(port, self.ranges[number].clone(), step, ground, laws)?;
             self.ports.push(patch);
         }
-        self.share_nodes(step);
         for p in 0..self.ports.len() {
             self.evaluate_at_rest(p)?;
         }
@@ -195,12 +202,17 @@ impl Patches {
         Ok(())
     }
 
-    fn read_port(&mut self, port: &Port, step: &Step, ground: &Ground, laws: &[Laws]) -> Result<Patch> {
-        let range = read_nodes(&mut self.nodes, port, step, ground, laws);
+    fn read_port(
+        &mut self,
+        port: &Port,
+        range: std::ops::Range<usize>,
+        step: &Step,
+        ground: &Ground,
+        laws: &[Laws],
+    ) -> Result<Patch> {
         self.rows.list(&self.nodes, range.clone());
         let n_z = port.frame[2];
         let spacing = ground.heights.lattice().spacing;
-        // a sphere has no extent and does not roll
         let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
         if !laws.iter().any(|law| law.pressure.keeps()) {
@@ -409,14 +421,17 @@ impl Patches {
         Ok(())
     }
 
-    /// If two ports cover a node, the deeper one presses; the other one's area there becomes 0.
-    fn share_nodes(&mut self, step: &Step) {
-        for b in 1..self.ports.len() {
+    /// Of a node that two ports cover, the deeper one takes the area of both, see [`PatchNodes::share_between`].
+    fn share_nodes(&mut self, step: &Step, ground: &Ground, laws: &[Laws]) {
+        let spacing = ground.heights.lattice().spacing;
+        let loaded = |[i, j]: [i32; 2]| ground.nodes.get(i, j).area;
+        for b in 1..self.ranges.len() {
             for a in 0..b {
-                let (nodes_a, nodes_b) = (step.ports[a].nodes(step.nodes), step.ports[b].nodes(step.nodes));
-                if overlap(nodes_a, nodes_b) {
-                    let (a, b) = (self.ports[a].nodes.clone(), self.ports[b].nodes.clone());
-                    self.nodes.share_between(a, b);
+                let (ports, nodes) = ([&step.ports[a], &step.ports[b]], step.nodes);
+                if overlap(ports[0].nodes(nodes), ports[1].nodes(nodes)) {
+                    let cells = ports.map(|port| spacing * spacing / port.frame[2]);
+                    let (a, b) = (self.ranges[a].clone(), self.ranges[b].clone());
+                    self.nodes.share_between([a, b], cells, |law| laws[law].elastic, loaded);
                 }
             }
         }

@@ -141,12 +141,29 @@ impl PatchNodes {
         })
     }
 
-    /// Of the nodes that two contacts cover, the deeper one presses; the other one's area there becomes 0.
-    pub fn share_between(&mut self, a: std::ops::Range<usize>, b: std::ops::Range<usize>) {
+    /// Of the nodes that two contacts cover, the deeper one presses, with the areas of both, and the other one's area there becomes 0: the
+    /// soil of a cell has one height. Where the other underside lies higher, it counts as far as the pressure of elastic soil
+    /// that comes back by the difference. `cells`: area of a whole cell in the tangent plane of each, m²; `elastic`: stiffness of the soil of a
+    /// number, Pa/m; `loaded`: area of a node that was loaded at the last commit, m².
+    pub fn share_between(
+        &mut self,
+        [a, b]: [std::ops::Range<usize>; 2],
+        cells: [f64; 2],
+        elastic: impl Fn(usize) -> f64,
+        loaded: impl Fn([i32; 2]) -> f64,
+    ) {
         for k in a {
             let Some(l) = b.clone().find(|l| self.index[*l] == self.index[k]) else { continue };
-            let loser = if self.depth[k] >= self.depth[l] { l } else { k };
-            self.area[loser] = 0.0;
+            let deeper = self.depth[k] >= self.depth[l];
+            let (winner, loser, cell) = if deeper { (k, l, cells[0]) } else { (l, k, cells[1]) };
+            let higher = elastic(self.law[winner]) * (self.depth[winner] - self.depth[loser]);
+            let before = self.before[winner].max(f64::MIN_POSITIVE);
+            let part = (1.0 - higher / before).clamp(0.0, 1.0);
+            let (own, area) = (self.area[winner], self.area[loser]);
+            let both = (own + part * area).min(cell.max(own));
+            let loaded = loaded(self.index[winner]);
+            self.loaded_part[winner] = if loaded < both { loaded / both } else { 1.0 };
+            (self.area[winner], self.area[loser]) = (both, 0.0);
         }
     }
 

@@ -177,19 +177,26 @@ impl Strategy for Monolithic {
         };
         let [force, motion] = [Capabilities::FORCE, Capabilities::MOTION].map(|can| every(problem, can));
         self.motion = !force;
-        let found = self.solve_form(problem, instances)?;
-        if matches!(found, Outcome::Converged) || !problem.has_grounds() || !(force && motion) {
-            return Ok(found);
+        let mut left = self.solve_form(problem, instances)?;
+        if left.is_some() && problem.has_grounds() && force && motion {
+            // at a kink of the law the depth under a force may jump where the wrench of a motion does not
+            self.motion = true;
+            left = self.solve_form(problem, instances)?;
         }
-        // at a kink of the law the depth under a force may jump where the wrench of a motion does not
-        self.motion = true;
-        self.solve_form(problem, instances)
+        Ok(match left {
+            None => Outcome::Converged,
+            Some(size) => Outcome::NotConverged(format!("monolithic: residual {size:.3e} N")),
+        })
     }
 }
 
 impl Monolithic {
-    /// Newton in the present form of the soils.
-    fn solve_form(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+    /// Newton in the present form of the soils. Returns the residual (N) where it did not converge.
+    fn solve_form(
+        &mut self,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<Option<f64>> {
         problem.start_from_last();
         self.measure_scale(problem, instances)?;
         let n = problem.n();
@@ -217,11 +224,11 @@ impl Monolithic {
         }
         problem.report.residual = size / problem.t_ref;
         if !(size <= 1e-7 * problem.t_ref.max(max_norm(&problem.t))) {
-            return Ok(Outcome::NotConverged(format!("monolithic: residual {size:.3e} N")));
+            return Ok(Some(size));
         }
         self.measure_gap(problem);
         problem.report.converged = true;
-        Ok(Outcome::Converged)
+        Ok(None)
     }
 
     /// Takes the step in `d` from `base`, halved until less than `before` is left; what is left.

@@ -80,7 +80,7 @@ impl Robot {
             _host: host,
             variables,
             actions: variables::actions(&dynamics.model),
-            ports: Ports::new(&dynamics.model),
+            ports: Ports::default(),
             dynamics,
             state,
             slots,

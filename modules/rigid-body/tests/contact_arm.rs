@@ -1,8 +1,8 @@
 //! The force of a contact port acts where the foot is when the rule takes forces, not where it was at the start.
 //!
 //! A free body with a foot far from its centre of mass on a springy, viscous ground, in a plane, against Runge–Kutta. The
-//! ball (three components) is pressed at its lowest point, which stays below its centre as it turns; the plate (six)
-//! at the point of the body that the port was put on.
+//! ball is pressed at its lowest point, which stays below its centre as it turns: about the point of the body that the port was put on
+//! this force has a moment. The plate is pressed at that point.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
@@ -34,20 +34,24 @@ impl Foot {
         if self == Self::Ball { r#"<sphere radius="0.1"/>"# } else { r#"<box size="0.2 0.2 0.2"/>"# }
     }
 
-    fn mask(self) -> u32 {
-        if self == Self::Ball { component::FORCE } else { component::WRENCH }
-    }
-
     /// From the centre of mass to where the ground pushes, x and z, at a pitch.
     fn arm(self, pitch: f64) -> [f64; 2] {
         let below = |[x, z]: [f64; 2]| [x, z - RADIUS];
         if self == Self::Ball { below(turned(FOOT, pitch)) } else { turned(below(FOOT), pitch) }
     }
 
-    /// Force along x and z and moment about y on the foot where it stands at z, moves with vx and is turned by pitch.
-    fn law(self, z: f64, vx: f64, pitch: f64) -> [f64; 3] {
-        let moment = if self == Self::Ball { 0.0 } else { -TURN_SPRING * pitch };
-        [-DAMPER * vx, -SPRING * z, moment]
+    /// Force along x and z and moment about y on the foot where it stands at z, moves with vx and is turned by pitch; the moment about
+    /// the point of the body that was its lowest one `turn` ago.
+    fn law(self, z: f64, vx: f64, pitch: f64, turn: f64) -> [f64; 3] {
+        let [along, up] = [-DAMPER * vx, -SPRING * z];
+        let moment = match self {
+            Self::Ball => {
+                let [x, z] = turned([0.0, -RADIUS], turn);
+                (-RADIUS - z) * along + x * up
+            }
+            Self::Plate => -TURN_SPRING * pitch,
+        };
+        [along, up, moment]
     }
 }
 
@@ -89,7 +93,7 @@ fn port(fixture: &Fixture, foot: Foot) -> Port {
         key: 1,
         kind: PortKind::Contact as u32,
         side: 1,
-        mask: foot.mask(),
+        mask: component::WRENCH,
         first: 0,
         body: 0,
         shape: fixture.scene.shapes[0].id,
@@ -105,7 +109,7 @@ fn port(fixture: &Fixture, foot: Foot) -> Port {
 /// A step of length h with the ground's law where the rule takes forces: at the end, or in the middle of the step.
 fn step(fixture: &mut Fixture, foot: Foot, h: f64, middle: bool) {
     let (ports, pitch) = ([port(fixture, foot)], pose(fixture)[2]);
-    let n = foot.mask().count_ones() as usize;
+    let n = ports[0].len();
     let step = Step { ports: &ports, n: n as u32, ..Step::free(fixture.t, h, fixture.index) };
     let [mut x, mut v, mut a, mut out_t] = [0; 4].map(|_| vec![0.0; n]);
     let mut t = vec![0.0; n];
@@ -114,11 +118,11 @@ fn step(fixture: &mut Fixture, foot: Foot, h: f64, middle: bool) {
     for _ in 0..60 {
         let share = if middle { 0.5 } else { 1.0 };
         let rate = if middle && h > 0.0 { x[1] / h } else { v[1] };
-        let turn = x.get(5).map_or(0.0, |turn| share * turn);
-        let [along, up, moment] = foot.law(ports[0].origin[2] + share * x[0], rate, pitch + turn);
+        let turn = share * x[5];
+        let [along, up, moment] = foot.law(ports[0].origin[2] + share * x[0], rate, pitch + turn, turn);
         let wanted = [up, along, 0.0, 0.0, 0.0, moment];
         let change = t.iter().zip(wanted).fold(0.0_f64, |m, (t, w)| larger(m, (t - w).abs()));
-        t.copy_from_slice(&wanted[..n]);
+        t.copy_from_slice(&wanted);
         let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut out_t, reached: 0.0, flags: 0 };
         fixture.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
         if change < 1e-12 {
@@ -136,7 +140,7 @@ fn reference(foot: Foot) -> [f64; 3] {
     let slope = |s: [f64; 6]| {
         let [_, z, pitch, vx, vz, w] = s;
         let [rx, rz] = foot.arm(pitch);
-        let [fx, fz, moment] = foot.law(z + rz, vx + w * rz, pitch);
+        let [fx, fz, moment] = foot.law(z + rz, vx + w * rz, pitch, 0.0);
         [vx, vz, w, fx / MASS, fz / MASS - GRAVITY, (moment + rz * fx - rx * fz) / INERTIA]
     };
     let moved = |s: [f64; 6], by: f64, k: [f64; 6]| std::array::from_fn(|i| s[i] + by * k[i]);

@@ -56,7 +56,7 @@ impl Patch {
 }
 
 /// Half lengths of the patch along t1 and t2: how far those of its nodes reach from the origin whose surface lies less than
-/// `margin` (m) below the underside, at most half the shape's width, at least half a cell. Zero for a sphere.
+/// `margin` (m) below the underside, at most half the shape's width, at least half a cell.
 pub fn extent<S: Surface + ?Sized>(
     shape: &Touching,
     surface: &S,
@@ -65,9 +65,6 @@ pub fn extent<S: Surface + ?Sized>(
     frame: &[f64; 9],
     nodes: &[Node],
 ) -> [f64; 2] {
-    if shape.is_sphere() {
-        return [0.0; 2];
-    }
     let lattice = surface.lattice();
     let half = 0.5 * lattice.spacing;
     [3, 6].map(|k| {

@@ -2,7 +2,6 @@
 
 use super::shape::Shape;
 use terraglue_ground::{Aabb, Part, Placed, bounds_of};
-use terraglue_subsystem::{Geometry, component};
 
 /// Some shapes of a piece, at least one.
 #[derive(Clone, Copy)]
@@ -56,24 +55,6 @@ impl<'a> Touching<'a> {
         let far =
             |d: [f64; 3]| self.each().map(|s| dot(s.placed.support(d), d)).fold(f64::NEG_INFINITY, f64::max);
         0.5 * (far(direction) + far(direction.map(|c| -c)))
-    }
-
-    /// Whether all of it is one sphere.
-    pub fn is_sphere(&self) -> bool {
-        self.mask() == component::FORCE
-    }
-
-    /// Components that the contact carries.
-    pub fn mask(&self) -> u32 {
-        self.single().map_or(component::WRENCH, |s| mask(s.placed.geometry()))
-    }
-}
-
-/// Components that a contact of this shape carries.
-fn mask(geometry: &Geometry) -> u32 {
-    match geometry {
-        Geometry::Sphere { .. } => component::FORCE,
-        _ => component::WRENCH,
     }
 }
 

@@ -5,7 +5,7 @@ use super::ground::{Cut, Reader};
 use super::shape::Shape;
 use super::touching::{Touching, part};
 use terraglue_ground::{Surface, nodes_below, nodes_below_parts};
-use terraglue_subsystem::{Law, Node, Port, PortKind};
+use terraglue_subsystem::{Law, Node, Port, PortKind, component};
 
 /// Which shapes of a piece come near the ground; kept from step to step.
 #[derive(Default)]
@@ -74,7 +74,7 @@ fn port_of(
         key: 0,
         kind: PortKind::Contact as u32,
         side: 1,
-        mask: touching.mask(),
+        mask: component::WRENCH,
         first: 0,
         body: touching.largest.body,
         shape: touching.largest.id,

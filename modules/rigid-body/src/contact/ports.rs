@@ -3,11 +3,9 @@
 use crate::dynamics::Dynamics;
 use crate::dynamics::carried::Carried;
 use crate::math::{V3, cayley, cayley_shift, cayley_vector};
-use crate::model::{Body, Model};
 use crate::motion::Motion;
 use terraglue_linear_solver::Path;
-use terraglue_robot_import::{Shape, ShapeGeometry};
-use terraglue_subsystem::{Port, PortKind, Response, component};
+use terraglue_subsystem::{Port, PortKind, Response};
 
 /// One packed component: a generalised direction on one body.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +16,7 @@ struct Component {
     /// World force and moment about the centre of mass of a unit wrench on the body at the start of the step; also
     /// rates → own motion.
     row: [f64; 6],
-    /// Of a force the part of its arm that turns with the body, at the start of the step; none for moments.
+    /// Of a force its arm, which turns with the body, at the start of the step; none for moments.
     carried: Option<V3>,
 }
 
@@ -31,9 +29,8 @@ impl Component {
 }
 
 /// Ports of the step with the factor's answer to each component.
+#[derive(Default)]
 pub(crate) struct Ports {
-    /// Centres of the shapes that are spheres from the centre of mass, body axes, m; by id of the shape.
-    balls: Vec<Option<V3>>,
     components: Vec<Component>,
     /// Answer of the factor to each component, along its path to the root; `stride` entries each.
     answers: Vec<f64>,
@@ -45,32 +42,6 @@ pub(crate) struct Ports {
 }
 
 impl Ports {
-    /// For the shapes of a model.
-    pub fn new(model: &Model) -> Self {
-        let shapes = model.bodies.iter().flat_map(|b| b.shapes.iter().map(move |s| (b, s)));
-        let ball = |(body, shape): (&Body, &Shape)| {
-            let round = matches!(shape.geometry, ShapeGeometry::Sphere { .. });
-            round.then(|| shape.body_from_shape.translation.vector - body.com)
-        };
-        Self {
-            balls: shapes.map(ball).collect(),
-            components: Vec::new(),
-            answers: Vec::new(),
-            stride: 0,
-            g: Vec::new(),
-            scratch: Vec::new(),
-            g_of: 0,
-        }
-    }
-
-    /// Part of the arm of a port that turns with the body: all of it, but a ball that carries no moments is touched
-    /// below its centre however it turns.
-    fn carried(&self, port: &Port, motion: &Motion, arm: V3) -> V3 {
-        let bare = port.mask & component::WRENCH & !component::FORCE == 0;
-        let centre = self.balls.get(port.shape as usize).copied().flatten().filter(|_| bare);
-        centre.map_or(arm, |centre| motion.q * centre)
-    }
-
     /// Takes over the ports; false when one names a body that does not exist or packs badly.
     pub fn assign(&mut self, ports: &[Port], n: usize, bodies: &[Motion]) -> bool {
         let idle = Component { body: 0, side: 1.0, row: [0.0; 6], carried: None };
@@ -82,13 +53,12 @@ impl Ports {
                 return false;
             };
             let arm = V3::from(port.origin) - motion.c;
-            let carried = self.carried(port, motion, arm);
             for (i, c) in port.components() {
                 let d = V3::from(port.direction(c));
                 let (force, moment) = if c < 3 { (d, arm.cross(&d)) } else { (V3::zeros(), d) };
                 let row = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
                 let side = f64::from(port.side.signum());
-                let carried = (c < 3).then_some(carried);
+                let carried = (c < 3).then_some(arm);
                 self.components[i] = Component { body: port.body as usize, side, row, carried };
             }
         }

@@ -8,7 +8,7 @@
 use super::scheme::Integrator;
 use crate::math::{V3, cayley_shift};
 
-/// An impulse on a point of a body, or below one: a ball is pressed at its lowest point, which stays below its centre.
+/// An impulse on a point of a body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Carried {
     pub body: usize,

@@ -130,13 +130,12 @@ impl Drive {
         self.nodes.clear();
         nodes_below(&placed, &Undisturbed(Shown::new(self.soil.as_ref())), MARGIN, &mut self.nodes);
         let bounds = placed.aabb();
-        let sphere = matches!(self.geometry, Geometry::Sphere { .. });
-        let half = |k: usize| if sphere { 0.0 } else { 0.5 * (bounds.max[k] - bounds.min[k]) };
+        let half = |k: usize| 0.5 * (bounds.max[k] - bounds.min[k]);
         Port {
             key: 7,
             kind: PortKind::Contact as u32,
             side: -1,
-            mask: if sphere { component::FORCE } else { component::WRENCH },
+            mask: component::WRENCH,
             first: 0,
             body: 0,
             shape: 0,

@@ -144,17 +144,12 @@ impl Feet {
                 continue;
             }
             let origin = body.patch_origin([0.0, 0.0, 1.0]);
-            let (mask, extent) = match body.geometry() {
-                Geometry::Sphere { .. } => (component::FORCE, [0.0; 2]),
-                _ => {
-                    (component::WRENCH, [body.half_width([1.0, 0.0, 0.0]), body.half_width([0.0, 1.0, 0.0])])
-                }
-            };
+            let extent = [body.half_width([1.0, 0.0, 0.0]), body.half_width([0.0, 1.0, 0.0])];
             let port = Port {
                 key: k as u64,
                 kind: PortKind::Contact as u32,
                 side: -1,
-                mask,
+                mask: component::WRENCH,
                 first: self.x.len() as u32,
                 body: k as u32,
                 shape: k as u32,

@@ -130,8 +130,8 @@ pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
     assert!(drift <= 1e-9, "drift {drift}");
     // the depth is the law's own: it carries the weight there, hardly more, and nothing a millimetre higher
     fixture.set_ports();
-    let here = fixture.under_motion(&[0.0; 3])[0];
-    let higher = fixture.under_motion(&[1e-3, 0.0, 0.0])[0];
+    let here = fixture.under_motion(&[0.0; 6])[0];
+    let higher = fixture.under_motion(&[1e-3, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
     assert!(here >= weight * (1.0 - 1e-8) && here < 1.1 * weight && higher == 0.0, "{here} {higher}");
     assert!((read(&*fixture.soil, "max_sinkage") - fixture.sunk()).abs() < 2e-4, "sunk {}", fixture.sunk());
     println!("sunk {:.3} mm, F {here:.2} N, evaluations {}", 1e3 * fixture.sunk(), fixture.evaluations);
@@ -379,17 +379,17 @@ fn hump(x: f64, y: f64) -> f64 {
 pub fn normal_inverse_is_exact<M: Module>(config: &str) {
     let mut fixture = Fixture::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
     for _ in 0..50 {
-        fixture.prescribed_step(&[-1e-4, 0.0, 0.0]);
+        fixture.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0]);
     }
     fixture.set_ports();
     for force in [1e-6, 1e-3, 0.1, 1.0, 5.0, 20.0, 200.0, 3000.0] {
-        let (x, _) = fixture.under_force(&[force, 0.0, 0.0], &[0.0; 3]);
+        let (x, _) = fixture.under_force(&[force, 0.0, 0.0, 0.0, 0.0, 0.0], &[0.0; 6]);
         let back = fixture.under_motion(&x)[0];
         assert!((back - force).abs() <= 1e-12 * force + 1e-9, "{force}: {back}");
     }
-    let (free, _) = fixture.under_force(&[0.0; 3], &[0.0; 3]);
-    assert_eq!(fixture.under_motion(&[free[0] + 1e-12, 0.0, 0.0])[0], 0.0);
-    assert!(fixture.under_motion(&[free[0] - 1e-9, 0.0, 0.0])[0] > 0.0);
+    let (free, _) = fixture.under_force(&[0.0; 6], &[0.0; 6]);
+    assert_eq!(fixture.under_motion(&[free[0] + 1e-12, 0.0, 0.0, 0.0, 0.0, 0.0])[0], 0.0);
+    assert!(fixture.under_motion(&[free[0] - 1e-9, 0.0, 0.0, 0.0, 0.0, 0.0])[0] > 0.0);
 }
 
 /// Above the ground the answer is the gap along n, and no force.
@@ -433,7 +433,7 @@ pub fn energy_balances<M: Module>(config: &str) {
     let mut fixture = Fixture::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
     for k in 0..1000 {
         let slide = if k > 500 { 1e-6 } else { 0.0 };
-        fixture.prescribed_step(&[if k < 500 { -2e-5 } else { 0.0 }, slide, 0.0]);
+        fixture.prescribed_step(&[if k < 500 { -2e-5 } else { 0.0 }, slide, 0.0, 0.0, 0.0, 0.0]);
     }
     let e = fixture.soil.energy();
     let stored = e.potential + e.dissipated;

@@ -63,9 +63,8 @@ pub fn forces<M: Module>(body: &Body, spacing: f64, depth: f64, at: [f64; 2]) ->
 /// The depth that the soil reports of a body that was pressed to `depth` (m) at a `place`.
 pub fn told<M: Module>(body: &Body, spacing: f64, depth: f64, place: (f64, [f64; 2])) -> f64 {
     let mut fixture = placed::<M>(body, spacing, place);
-    let n = fixture.components();
     for _ in 0..100 {
-        fixture.prescribed_step(&[-0.01 * depth, 0.0, 0.0, 0.0, 0.0, 0.0][..n]);
+        fixture.prescribed_step(&[-0.01 * depth, 0.0, 0.0, 0.0, 0.0, 0.0]);
     }
     read(&*fixture.soil, "contact1.sinkage")
 }
@@ -86,10 +85,9 @@ fn placed<M: Module>(body: &Body, spacing: f64, (yaw, at): (f64, [f64; 2])) -> F
 pub fn pressed<M: Module>(body: &Body, spacing: f64, load: f64, step: f64, place: (f64, [f64; 2])) -> f64 {
     let mut fixture = placed::<M>(body, spacing, place);
     let down = [-step, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let n = fixture.components();
     let mut before = (0.0, 0.0);
     for k in 1..4000 {
-        let now = (step * f64::from(k), fixture.prescribed_step(&down[..n])[0]);
+        let now = (step * f64::from(k), fixture.prescribed_step(&down)[0]);
         if now.1 >= load {
             return before.0 + (now.0 - before.0) * (load - before.1) / (now.1 - before.1);
         }

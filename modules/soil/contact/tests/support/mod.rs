@@ -202,23 +202,17 @@ impl Fixture {
         self.position = self.normal.map(|c| above * c);
     }
 
-    pub fn components(&self) -> usize {
-        if matches!(self.geometry, Geometry::Sphere { .. }) { 3 } else { 6 }
-    }
-
     /// Finds the patch at the present pose.
     pub fn detect(&mut self) {
         let pose = Pose { position: self.position, orientation: self.orientation };
         let placed = Placed::new(&self.geometry, &pose);
         self.nodes.clear();
         nodes_below(&placed, &Shown::new(&*self.soil), 0.02, &mut self.nodes);
-        let (mask, below, extent) = match self.geometry {
-            Geometry::Sphere { radius } => (component::FORCE, radius, [0.0; 2]),
-            Geometry::Box { half_extents: e } => (component::WRENCH, e[2], [e[0], e[1]]),
-            Geometry::Cylinder { half_length, radius } => (component::WRENCH, half_length, [radius; 2]),
-            Geometry::Capsule { half_length, radius } => {
-                (component::WRENCH, radius, [half_length + radius, radius])
-            }
+        let (below, extent) = match self.geometry {
+            Geometry::Sphere { radius } => (radius, [radius; 2]),
+            Geometry::Box { half_extents: e } => (e[2], [e[0], e[1]]),
+            Geometry::Cylinder { half_length, radius } => (half_length, [radius; 2]),
+            Geometry::Capsule { half_length, radius } => (radius, [half_length + radius, radius]),
             _ => panic!("not used"),
         };
         let n = self.normal;
@@ -234,7 +228,7 @@ impl Fixture {
             key: 7,
             kind: PortKind::Contact as u32,
             side: -1,
-            mask,
+            mask: component::WRENCH,
             first: 0,
             body: 0,
             shape: 0,
@@ -265,7 +259,7 @@ impl Fixture {
     /// (x2, law force) of `set_ports`.
     pub fn set_ports(&mut self) -> (Vec<f64>, Vec<f64>) {
         self.detect();
-        let n = self.components();
+        let n = self.ports[0].len();
         let (mut x, mut v, mut a, mut t) =
             (vec![f64::NAN; n], vec![f64::NAN; n], vec![f64::NAN; n], vec![f64::NAN; n]);
         let step = Self::step_info(&self.ports, &self.nodes, self.time, self.h, self.index, n);
@@ -278,7 +272,7 @@ impl Fixture {
     }
 
     pub fn trial(&mut self, input: &Input) -> (Vec<f64>, Vec<f64>) {
-        let n = self.components();
+        let n = self.ports[0].len();
         let (mut x, mut v, mut a, mut t) =
             (vec![f64::NAN; n], vec![f64::NAN; n], vec![f64::NAN; n], vec![f64::NAN; n]);
         let step = Self::step_info(&self.ports, &self.nodes, self.time, self.h, self.index, n);
@@ -291,7 +285,7 @@ impl Fixture {
     }
 
     pub fn jacobian(&mut self) -> Vec<f64> {
-        let n = self.components();
+        let n = self.ports[0].len();
         let mut out = vec![f64::NAN; n * n];
         let step = Self::step_info(&self.ports, &self.nodes, self.time, self.h, self.index, n);
         self.soil.interface_jacobian(&step, Level::Position, &mut out).unwrap();
@@ -329,7 +323,7 @@ impl Fixture {
     pub fn cooperative_step(&mut self) {
         let (x2, force) = self.set_ports();
         self.law_force = force;
-        let n = self.components();
+        let n = self.ports[0].len();
         let x_free = self.to_port(self.free());
         let g = self.h * self.h / self.mass;
         let mut t_star = vec![0.0; n];
@@ -366,7 +360,7 @@ impl Fixture {
         self.law_force = force;
         let x_free = self.to_port(self.free());
         let g = self.h * self.h / self.mass;
-        let n = self.components();
+        let n = self.ports[0].len();
         // start from the estimate: rest where the foot is pressed
         let mut x = vec![0.0; n];
         let mut t = vec![0.0; n];
@@ -397,7 +391,7 @@ impl Fixture {
     }
 
     fn finish(&mut self, t: &[f64], x_free: [f64; 3], g: f64) {
-        let n = self.components();
+        let n = self.ports[0].len();
         let mut x = vec![0.0; n];
         (0..3).for_each(|k| x[k] = x_free[k] + g * t[k]);
         let moved = self.to_world(&x);
@@ -418,7 +412,7 @@ impl Fixture {
         self.set_ports();
         let t = self.under_motion(x);
         let v: Vec<f64> = x.iter().map(|x| x / self.h).collect();
-        let n = self.components();
+        let n = self.ports[0].len();
         let step = Self::step_info(&self.ports, &self.nodes, self.time, self.h, self.index, n);
         self.soil.commit(&step, &t, &Motion { x, v: &v }).unwrap();
         let moved = self.to_world(x);

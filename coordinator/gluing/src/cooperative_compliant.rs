@@ -71,6 +71,7 @@ impl Strategy for CooperativeCompliant {
         problem.solve_compatibility(true, instances)?;
         problem.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
         let form = Form::choose(self.form, self.kappa, problem, instances);
+        self.xt.reserve(problem.n());
         let mut left = 0.0;
         for pass in 1..=PASSES {
             problem.predict_from_estimate();

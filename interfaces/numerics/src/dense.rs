@@ -21,6 +21,12 @@ pub struct Lu {
 }
 
 impl Lu {
+    /// Room for a matrix of n × n.
+    pub fn reserve(&mut self, n: usize) {
+        make_room(&mut self.factors, n * n);
+        make_room(&mut self.pivots, n);
+    }
+
     /// Factors the matrix whose entry (row, column) is `entry(row, column)`. Returns its numerical rank: the
     /// number of pivots above 1e-14 of the largest; smaller pivots are replaced, so that a solve stays finite.
     pub fn factor(&mut self, n: usize, mut entry: impl FnMut(usize, usize) -> f64) -> usize {
@@ -99,6 +105,11 @@ pub fn multiply_add(a: &[f64], x: &[f64], y: &mut [f64]) {
             *sum += entry * factor;
         }
     }
+}
+
+/// Lets `vector` take n entries without allocating.
+pub fn make_room<T>(vector: &mut Vec<T>, n: usize) {
+    vector.reserve(n.saturating_sub(vector.len()));
 }
 
 /// max |a_i|.

@@ -203,6 +203,7 @@ impl Strategy for Iterative {
         self.start.clear();
         self.start.extend_from_slice(&problem.t);
         let first = Form::choose(self.form, self.kappa, problem, instances);
+        self.xt.reserve(problem.n());
         let outcome = self.run(first, problem, instances)?;
         if outcome == Outcome::Converged || self.form.is_some() {
             return Ok(outcome);

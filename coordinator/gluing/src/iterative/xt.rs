@@ -12,7 +12,7 @@ use super::super::interface_problem::InterfaceProblem;
 use super::{Limits, largest_eigenvalue};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_numerics::dense::{Lu, max_norm, multiply_add};
+use terraglue_numerics::dense::{Lu, make_room, max_norm, multiply_add};
 
 /// Halvings of one Newton step before it is taken as it is.
 const MAX_HALVINGS: u32 = 8;
@@ -32,6 +32,15 @@ pub struct XtForm {
 }
 
 impl XtForm {
+    /// Room for n components, so that a step that changes to this form does not allocate.
+    pub fn reserve(&mut self, n: usize) {
+        [&mut self.k, &mut self.kg].map(|matrix| make_room(matrix, n * n));
+        let vectors =
+            [&mut self.residual, &mut self.d, &mut self.base, &mut self.work, &mut self.predicted];
+        vectors.map(|vector| make_room(vector, n));
+        self.lu.reserve(n);
+    }
+
     /// Iterates from `problem.t`: inside against the linearised bodies, outside against the bodies themselves.
     pub fn solve(
         &mut self,

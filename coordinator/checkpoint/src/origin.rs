@@ -132,7 +132,7 @@ fn parts(scenario: &Scenario, options: &Options) -> Result<Vec<Part>> {
     let mut all = Vec::new();
     for spec in &scenario.subsystems {
         let name = format!("`{}` ({})", spec.name, spec.module);
-        if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
+        if spec.is_fmu() {
             all.push(Part::of(name, Some(&scenario.folder.join(&spec.module))));
             continue;
         }

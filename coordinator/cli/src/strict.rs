@@ -3,7 +3,7 @@
 use super::scenario_arguments::ScenarioArguments;
 use terraglue_diagnostics::Result;
 use terraglue_host::SearchPath;
-use terraglue_scenario::{ModuleKind, Scenario};
+use terraglue_scenario::Scenario;
 
 /// Loads the scenario with its edits, and with `strict = true` where that is wanted and known.
 pub fn load(arguments: &ScenarioArguments, sets: &[(String, String)], strict: bool) -> Result<Scenario> {
@@ -20,7 +20,7 @@ pub fn load(arguments: &ScenarioArguments, sets: &[(String, String)], strict: bo
         let found = library.find(module, &search, &scenario.folder);
         found.is_ok_and(|m| m.schema().parameters.iter().any(|p| p.name == "strict"))
     };
-    let strict = scenario.subsystems.iter().filter(|s| ModuleKind::is_fmu(&s.module) || knows(&s.module));
+    let strict = scenario.subsystems.iter().filter(|s| s.is_fmu() || knows(&s.module));
     let strict = strict.map(|s| (format!("{}.strict", s.name), "true".to_owned()));
     let sets: Vec<_> = sets.iter().cloned().chain(strict).collect();
     options.resize(sets.len(), "--strict");

@@ -10,9 +10,7 @@ use terraglue_fmi::export::{Compression, Content, pack};
 use terraglue_fmi::ssp::{self, NewComponent, NewConnection};
 use terraglue_fmi::{Fmu, ModelDescription};
 use terraglue_fmu::start_values;
-use terraglue_scenario::{
-    Connection, ConnectionOrder, Extrapolate, InputError, ModuleKind, Scenario, SubsystemSpec,
-};
+use terraglue_scenario::{Connection, ConnectionOrder, Extrapolate, InputError, Scenario, SubsystemSpec};
 use terraglue_subsystem::ValueType;
 
 /// Writes the archive.
@@ -47,7 +45,7 @@ pub fn write(from: &Path, to: &Path) -> Result<Exit> {
 fn fits(scenario: &Scenario) -> Result {
     let source = &scenario.source;
     let help = || Some("`terraglue export` makes one FMU of a whole scenario".to_owned());
-    if let Some(spec) = scenario.subsystems.iter().find(|s| !ModuleKind::is_fmu(&s.module)) {
+    if let Some(spec) = scenario.subsystems.iter().find(|s| !s.is_fmu()) {
         let message = format!("`{}` is a module: a system structure holds FMUs only", spec.name);
         return Err(source.error_at_value(&[&spec.name, "module"], message, help()).into());
     }

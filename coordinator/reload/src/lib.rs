@@ -151,8 +151,7 @@ impl Reloader {
         let folder = tempfile::Builder::new().prefix("terraglue-reload-").tempdir();
         let folder = folder.map_err(|source| Error::File { path: "a temporary folder".into(), source })?;
         let mut watched = Vec::new();
-        for spec in scenario.subsystems.iter().filter(|s| !terraglue_scenario::ModuleKind::is_fmu(&s.module))
-        {
+        for spec in scenario.subsystems.iter().filter(|s| !s.is_fmu()) {
             let module = terraglue_engine::testbed::find(scenario, spec, run, &terraglue_fmu::library())?;
             watched.extend(Watched::new(scenario, spec, Part::Module, &module));
             if let Some(name) = law_of(spec) {

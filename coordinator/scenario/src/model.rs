@@ -5,6 +5,7 @@ use super::choices::{
     StartChoice, StrategyKind,
 };
 use super::isolation::IsolationSpec;
+use super::module_kind::ModuleKind;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -364,6 +365,13 @@ pub struct SubsystemSpec {
     pub offered: Map<String, Value>,
     /// Soils by the labels of the mask, in ascending order.
     pub regions: Vec<Region>,
+}
+
+impl SubsystemSpec {
+    /// Whether it is an FMU.
+    pub fn is_fmu(&self) -> bool {
+        ModuleKind::is_fmu(&self.module)
+    }
 }
 
 /// A label of a soil's mask.

@@ -275,7 +275,7 @@ fn instantiate(
     let search = SearchPath::standard(&options.module_paths, &scenario.folder);
     let (mut instances, mut mounted) = (Vec::new(), Vec::new());
     for spec in &scenario.subsystems {
-        if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
+        if spec.is_fmu() {
             let folder = std::env::current_dir();
             instances.push(fmu(scenario, spec, library, services)?);
             stay_in(folder, &spec.name);

@@ -181,7 +181,7 @@ impl Bundle<'_> {
 
     fn subsystems(&mut self) -> Result {
         for spec in &self.scenario.subsystems {
-            if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
+            if spec.is_fmu() {
                 let to =
                     self.take(&self.scenario.folder.join(&spec.module), format!("fmus/{}.fmu", spec.name))?;
                 self.set(&spec.name, "fmu", &to);

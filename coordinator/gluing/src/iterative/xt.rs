@@ -34,10 +34,12 @@ pub struct XtForm {
 impl XtForm {
     /// Room for n components, so that a step that changes to this form does not allocate.
     pub fn reserve(&mut self, n: usize) {
-        [&mut self.k, &mut self.kg].map(|matrix| make_room(matrix, n * n));
-        let vectors =
-            [&mut self.residual, &mut self.d, &mut self.base, &mut self.work, &mut self.predicted];
-        vectors.map(|vector| make_room(vector, n));
+        for matrix in [&mut self.k, &mut self.kg] {
+            make_room(matrix, n * n);
+        }
+        for vector in [&mut self.residual, &mut self.d, &mut self.base, &mut self.work, &mut self.predicted] {
+            make_room(vector, n);
+        }
         self.lu.reserve(n);
     }
 

@@ -162,7 +162,7 @@ def legs(tmp_path_factory):
 
     with ThreadPoolExecutor(2) as pool:
         # the long ones first
-        walks = {(case[0], step): pool.submit(walk, case, step) for step in (5e-4, 1e-3) for case in LEGS}
+        walks = {(case[0], step): pool.submit(walk, case, step) for step in (2.5e-4, 5e-4) for case in LEGS}
         return {key: walk.result() for key, walk in walks.items()}
 
 
@@ -174,8 +174,8 @@ def apart(one, other):
 
 @pytest.mark.parametrize("fault", ["torque", "loss", "block"])
 def test_the_fault_of_a_leg_shows_and_not_the_step(legs, fault):
-    path, heading = apart(legs[fault, 1e-3], legs["undisturbed", 1e-3])
-    half_path, half_heading = apart(legs[fault, 1e-3], legs[fault, 5e-4])
+    path, heading = apart(legs[fault, 5e-4], legs["undisturbed", 5e-4])
+    half_path, half_heading = apart(legs[fault, 5e-4], legs[fault, 2.5e-4])
     assert path > 0.01 and heading > 0.01, "there is something to be seen"
     assert path >= 5 * half_path, f"path {1e3 * path:.1f} mm by the fault, {1e3 * half_path:.1f} mm by half the step"
     assert heading >= 5 * half_heading, f"heading {heading:.4f} rad by the fault, {half_heading:.4f} rad by half the step"

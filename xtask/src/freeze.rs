@@ -40,7 +40,7 @@ pub fn freeze(arguments: &Arguments) -> Outcome {
     let built = program("debug");
     let program = arguments.program.as_deref().unwrap_or(&built);
     if arguments.program.is_none() {
-        must(cargo(&["build"]).args(["--package", "terraglue-cli", "--package", "terraglue-fmu-library"]))?;
+        must(&mut cargo(&["build", "--workspace"]))?;
     }
     let no_figures = arguments.no_figures || arguments.program.is_some();
     let scratch = target().join("freeze");

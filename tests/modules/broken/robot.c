@@ -57,13 +57,13 @@ static void move(const robot *r, const double force[3], double h, double velocit
 }
 
 /* World direction of component c of a port; the ball does not turn, so moments do nothing. */
-static const double *direction(const tg_port *p, uint32_t c) { return p->frame + 3 * c; }
+static const double still[3] = { 0.0 };
+static const double *direction(const tg_port *p, uint32_t c) { return c < 3 ? p->frame + 3 * c : still; }
 static tg_status set_ports(void *self, const tg_step *st, tg_law *laws, tg_response *now) {
     robot *r = self;
     (void)laws; /* friction is the ground's business */
     for (uint32_t p = 0; p < st->n_ports; p++) {
-        if (st->ports[p].mask & ~7u) return refuse(r->error, "a ball carries no moments");
-        for (uint32_t c = 0, i = st->ports[p].first; c < 3; c++) {
+        for (uint32_t c = 0, i = st->ports[p].first; c < 6; c++) {
             if (!(st->ports[p].mask >> c & 1)) continue;
             now->x[i] = now->a[i] = now->t[i] = 0.0, now->v[i++] = dot(direction(&st->ports[p], c), r->now.velocity);
         }
@@ -75,7 +75,7 @@ static tg_status advance(void *self, const tg_step *st, const tg_input *in, tg_r
     double force[3] = { 0.0, 0.0, 0.0 };
     if (in->kind != TG_FORCE) return TG_UNSUPPORTED;
     for (uint32_t p = 0; p < st->n_ports; p++)
-        for (uint32_t c = 0, i = st->ports[p].first; c < 3; c++) {
+        for (uint32_t c = 0, i = st->ports[p].first; c < 6; c++) {
             if (!(st->ports[p].mask >> c & 1)) continue;
             for (int k = 0; k < 3; k++) force[k] += st->ports[p].side * in->t[i] * direction(&st->ports[p], c)[k];
             i++;
@@ -84,7 +84,7 @@ static tg_status advance(void *self, const tg_step *st, const tg_input *in, tg_r
     move(r, force, st->h, r->next.velocity);
     for (int k = 0; k < 3; k++) r->next.position[k] += st->h * r->next.velocity[k];
     for (uint32_t p = 0; p < st->n_ports; p++)
-        for (uint32_t c = 0, i = st->ports[p].first; c < 3; c++) {
+        for (uint32_t c = 0, i = st->ports[p].first; c < 6; c++) {
             if (!(st->ports[p].mask >> c & 1)) continue;
             const double *d = direction(&st->ports[p], c);
             out->v[i] = dot(d, r->next.velocity), out->x[i] = st->h * out->v[i], out->t[i] = in->t[i];
@@ -99,10 +99,10 @@ static tg_status interface_jacobian(void *self, const tg_step *st, uint32_t leve
     if (level > TG_ACCELERATION) return TG_UNSUPPORTED;
     double share = (level == TG_POSITION ? st->h * st->h : level == TG_VELOCITY ? st->h : 1.0) / r->mass;
     for (uint32_t p = 0; p < st->n_ports; p++)
-        for (uint32_t c = 0, i = st->ports[p].first; c < 3; c++) {
+        for (uint32_t c = 0, i = st->ports[p].first; c < 6; c++) {
             if (!(st->ports[p].mask >> c & 1)) continue;
             for (uint32_t q = 0; q < st->n_ports; q++)
-                for (uint32_t e = 0, j = st->ports[q].first; e < 3; e++)
+                for (uint32_t e = 0, j = st->ports[q].first; e < 6; e++)
                     if (st->ports[q].mask >> e & 1)
                         out[(size_t)st->n * j++ + i] = share * dot(direction(&st->ports[p], c), direction(&st->ports[q], e));
             i++;
@@ -120,10 +120,10 @@ static tg_status estimate_forces(void *self, const tg_step *st, const tg_motion 
     for (uint32_t p = 0; p < st->n_ports; p++) {
         const tg_port *port = &st->ports[p];
         double per_metre = r->mass / (st->h * st->h * st->n_ports), slip = 0.0;
-        for (uint32_t c = 0, i = port->first; c < 3; c++) {
+        for (uint32_t c = 0, i = port->first; c < 6; c++) {
             if (!(port->mask >> c & 1)) continue;
             out->x_free[i] = st->h * dot(direction(port, c), free_velocity);
-            out->t_star[i] = per_metre * (partner->x[i] - out->x_free[i]);
+            out->t_star[i] = c < 3 ? per_metre * (partner->x[i] - out->x_free[i]) : 0.0;
             if (c > 0) slip = hypot(slip, out->t_star[i]);
             i++;
         }

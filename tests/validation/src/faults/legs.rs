@@ -13,14 +13,14 @@ const CASES: [(&str, &str, &str, &[&str]); 4] = [
 ];
 
 /// Step, s, and number of steps from record to record: the same times with either step.
-const STEPS: [(&str, &str); 2] = [("0.001", "10"), ("0.0005", "20")];
+const STEPS: [(&str, &str); 2] = [("0.0005", "20"), ("0.00025", "40")];
 
 /// Smallest ratio of the change by a fault to the change by halving the step of the same walk.
 const LEAST_RATIO: f64 = 5.0;
 
 /// The four walks.
 pub struct Legs {
-    /// With h = 1 ms, in the order of the table.
+    /// With the step of the scenarios, 0.5 ms, in the order of the table.
     pub walks: Vec<(&'static str, Walk)>,
     /// With half the step.
     halved: Vec<Walk>,
@@ -43,7 +43,7 @@ impl Legs {
         Ok(Self { walks, halved })
     }
 
-    /// Of a walk with h = 1 ms: path (mm) and heading (degrees) against the undisturbed walk, and against itself with half the step.
+    /// Of a walk: path (mm) and heading (degrees) against the undisturbed walk, and against itself with half the step.
     fn effects(&self, k: usize) -> Outcome<[(f64, f64); 2]> {
         let walk = &self.walks[k].1;
         Ok([walk.difference(&self.walks[0].1)?, walk.difference(&self.halved[k])?])

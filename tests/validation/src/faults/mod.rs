@@ -16,7 +16,7 @@ use crate::process::{Outcome, cargo, must, program, read, root, write};
 /// # Errors
 /// A run that fails, or a page that cannot be written.
 pub fn write_page() -> Outcome {
-    must(&mut cargo(&["build", "--package", "terraglue-cli"]))?;
+    must(&mut cargo(&["build", "--workspace"]))?;
     let scratch = tempfile::tempdir().map_err(|e| format!("temporary folder: {e}"))?;
     let place = walk::Place { program: program("debug"), folder: scratch.path().to_owned() };
     let legs = legs::Legs::run(&place)?;

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::path::Path;
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;
-use terraglue_acceptance::{ROOT, build, read};
+use terraglue_acceptance::{ROOT, build, read, steps};
 
 const RADIUS: f64 = 0.05;
 const MASS: f64 = 3.0;
@@ -62,12 +62,6 @@ model = "robot.urdf"
     build(&scenario).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn run_until(testbed: &mut Testbed, t_s: f64) {
-    while testbed.t_s() < t_s - 5e-4 {
-        testbed.step().unwrap_or_else(|e| panic!("{e}"));
-    }
-}
-
 /// A link of one moment of inertia about all axes.
 fn link(name: &str, mass: f64, inertia: f64, collisions: &str) -> String {
     format!(
@@ -104,7 +98,7 @@ fn ball(shape: &str, soil: &str, strategy: &str) -> Testbed {
 /// Kinetic energy (J) and way (m) after half a second.
 fn rolled(shape: &str, soil: &str, strategy: &str) -> [f64; 2] {
     let mut testbed = ball(shape, soil, strategy);
-    run_until(&mut testbed, 0.5);
+    steps(&mut testbed, 500);
     [testbed.energy().kinetic, read(&testbed, "robot.b.x") + 0.7]
 }
 
@@ -147,7 +141,7 @@ fn a_smooth_sled_is_not_held_back_by_the_edge_of_its_sole() {
             "cooperative",
             &format!("position_m = [{}, {}, {}]\nplace_on_ground = false", above * x, above * y, above * z),
         );
-        run_until(&mut testbed, 0.4);
+        steps(&mut testbed, 400);
         let at = ["x", "y", "z"].map(|c| read(&testbed, &format!("robot.b.{c}")));
         let way = ((at[0] - above * x).hypot(at[1] - above * y)).hypot(at[2] - above * z);
         println!("{soil}, heading {heading}: {way} of {free} m");
@@ -183,7 +177,7 @@ fn two_plates_that_share_cells_bear_as_one() {
                  velocity_target = {{ press = 0.02 }}"
             ),
         );
-        run_until(&mut testbed, 0.5);
+        steps(&mut testbed, 500);
         read(&testbed, "robot.press.torque")
     };
     for soil in ["soil-bekker", "soil-cellular-automaton"] {

@@ -236,7 +236,7 @@ pub fn print_bits() -> Outcome {
 /// # Errors
 /// A run that fails, or a picture that cannot be written.
 pub fn write_pictures() -> Outcome {
-    must(&mut cargo(&["build", "--package", "terraglue-cli"]))?;
+    must(&mut cargo(&["build", "--workspace"]))?;
     soil::write_pictures()?;
     walk::write_picture(&program("debug"))
 }

@@ -123,8 +123,9 @@ impl Fold {
                 }
             }
             if high > low {
-                rises +=
-                    if high < half { level } else { ends[1] } - if low > -half { level } else { ends[0] };
+                let enters = if low > -half { level } else { ends[0] };
+                let leaves = if high < half { level } else { ends[1] };
+                rises += leaves - enters;
                 length += high - low;
             }
             rises += OUTSIDE * (ends[1] - ends[0]);
@@ -178,6 +179,43 @@ mod tests {
             prop_assert!(near(found.variance, points.variance, 1e-6));
             prop_assert!((0..2).all(|c| near(found.slope[c], points.slope[c], 1.0)));
             prop_assert!(near(found.steeper, points.steeper, 1.0));
+        }
+
+        /// The mean slope of the part in the soil against many points along the same lines.
+        #[test]
+        fn the_underside_faces_as_its_part_in_the_soil(
+            slopes in prop::array::uniform3(prop::array::uniform2(-2.0..2.0f64)), below in prop::array::uniform2(0.0..0.004f64),
+            level in -0.002..0.01f64,
+        ) {
+            let [own, others @ ..] = slopes;
+            let (spacing, ground) = (0.01, [0.1, -0.05]);
+            let mut fold = Fold::new(Plane { height: 0.3, slope: own }, spacing, ground);
+            for (slope, below) in others.into_iter().zip(below) {
+                fold.add(Plane { height: 0.3 - below, slope });
+            }
+            let place: [f64; SAMPLES] = std::array::from_fn(|s| ((s as f64 + 0.5) / SAMPLES as f64 - 0.5) * spacing);
+            for axis in [0, 1] {
+                let count = 4000;
+                let (mut sum, mut weights) = (0.0, 0.0);
+                for across in place {
+                    for k in 0..count {
+                        let along = ((f64::from(k) + 0.5) / f64::from(count) - 0.5) * spacing;
+                        let over = |p: &Plane| {
+                            let tilt = [0, 1].map(|c| p.slope[c] - ground[c]);
+                            (p.height - 0.3 + tilt[axis] * along + tilt[1 - axis] * across, tilt[axis])
+                        };
+                        let faces = fold.planes[..fold.count].iter().map(over);
+                        let (top, tilt) = faces.fold((f64::NEG_INFINITY, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+                        let weight = f64::from(u8::from(top < level)) + OUTSIDE;
+                        sum += weight * tilt;
+                        weights += weight;
+                    }
+                }
+                let found = fold.mean_slope(axis, &place, level);
+                // where each of the lines enters the soil and leaves it one point may lie on the wrong side
+                let off = (found - ground[axis] - sum / weights).abs();
+                prop_assert!(off <= 2.0 * SAMPLES as f64 * 4.2 / weights, "{} {}", found - ground[axis], sum / weights);
+            }
         }
     }
 }

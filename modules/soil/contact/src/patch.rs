@@ -7,7 +7,7 @@ use crate::clinging::ClingingNodes;
 use crate::cone::{self, Cone};
 use crate::contact_memory::recall;
 use crate::ground::Ground;
-use crate::patch_nodes::{Facing, PatchNodes, Plane};
+use crate::patch_nodes::{Facing, PatchNodes, Plane, loaded_part};
 use crate::rows::Rows;
 use crate::size::Size;
 use crate::spread::Spread;
@@ -491,7 +491,7 @@ fn read_node(nodes: &mut PatchNodes, port: &Port, node: &Node, ground: &Ground, 
     nodes.entered.push(false);
     nodes.relief.push(f64::NAN);
     nodes.area.push(area);
-    nodes.loaded_part.push(if state.area < area { state.area / area } else { 1.0 });
+    nodes.loaded_part.push(loaded_part(state.area, area));
     nodes.arm.push([along(0), along(1), along(2)]);
     nodes.law.push(number);
     nodes.shear.push(state.shear);

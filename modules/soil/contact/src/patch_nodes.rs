@@ -61,6 +61,11 @@ pub struct Plane {
     pub slope: [f64; 2],
 }
 
+/// Part of `area` (m²) that was loaded where `loaded` (m²) was.
+pub fn loaded_part(loaded: f64, area: f64) -> f64 {
+    if loaded < area { loaded / area } else { 1.0 }
+}
+
 /// The nodes of all patches, one array per quantity.
 #[derive(Clone, Debug, Default)]
 pub struct PatchNodes {
@@ -161,8 +166,7 @@ impl PatchNodes {
             let part = (1.0 - higher / before).clamp(0.0, 1.0);
             let (own, area) = (self.area[winner], self.area[loser]);
             let both = (own + part * area).min(cell.max(own));
-            let loaded = loaded(self.index[winner]);
-            self.loaded_part[winner] = if loaded < both { loaded / both } else { 1.0 };
+            self.loaded_part[winner] = loaded_part(loaded(self.index[winner]), both);
             (self.area[winner], self.area[loser]) = (both, 0.0);
         }
     }

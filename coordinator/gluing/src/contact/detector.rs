@@ -60,6 +60,8 @@ struct Bodies {
     /// Those of one piece one after the other.
     shapes: Vec<Shape>,
     pieces: Vec<Range<usize>>,
+    /// [`Touching::relief`] of each piece, m.
+    relief: Vec<f64>,
     /// Numbers 0, 1, … of the shapes.
     numbers: Vec<usize>,
     found: Found,
@@ -166,8 +168,11 @@ impl Bodies {
     fn of(side: &BodySide) -> Self {
         let (shapes, pieces) = pieces_of(side.scene);
         let found = Found::with_capacity(pieces.iter().map(Range::len).max().unwrap_or(0));
-        let numbers = (0..shapes.len()).collect();
-        Self { subsystem: side.subsystem, name: side.name.into(), shapes, pieces, numbers, found }
+        let numbers: Vec<usize> = (0..shapes.len()).collect();
+        let relief =
+            |piece: &Range<usize>| Touching::of(&shapes, &numbers[piece.clone()]).map_or(0.0, |t| t.relief());
+        let relief = pieces.iter().map(relief).collect();
+        Self { subsystem: side.subsystem, name: side.name.into(), shapes, pieces, relief, numbers, found }
     }
 
     fn place(&mut self, now: &Now, states: &[BodyState]) -> Result {
@@ -197,7 +202,8 @@ impl Bodies {
     ) -> Result {
         for p in 0..self.pieces.len() {
             let piece = self.pieces[p].clone();
-            let reach = self.near(now, states, piece.clone(), (reader, bounds))?;
+            let relief = self.relief[p];
+            let reach = self.near(now, states, (piece.clone(), relief), (reader, bounds))?;
             if self.found.near.is_empty() {
                 continue;
             }
@@ -205,7 +211,9 @@ impl Bodies {
                 *buried = self.buried(piece.clone(), reader);
             }
             let first_node = set.nodes.len();
-            let Some(port) = self.found.port(&self.shapes, reader, reach, &mut set.nodes) else { continue };
+            let Some(port) = self.found.port(&self.shapes, reader, [reach, relief], &mut set.nodes) else {
+                continue;
+            };
             let node_count = (set.nodes.len() - first_node) as u32;
             let (body, shape) = (port.body, port.shape);
             set.ports.push(Port {
@@ -219,12 +227,12 @@ impl Bodies {
         Ok(())
     }
 
-    /// Finds which shapes of a piece come near the ground, and how far any of them can get, m.
+    /// Finds which shapes of a piece of some relief (m) come near the ground, and how far any of them can get, m.
     fn near(
         &mut self,
         now: &Now,
         states: &[BodyState],
-        piece: Range<usize>,
+        (piece, relief): (Range<usize>, f64),
         (reader, bounds): (&Reader, &mut Bounds),
     ) -> Result<f64> {
         self.found.near.clear();
@@ -233,7 +241,8 @@ impl Bodies {
             let shape = &self.shapes[k];
             let reach = shape.reach(now, &states[shape.body as usize]);
             let swept = shape.swept(reach);
-            if self.is_over(now, shape, reader, &swept)? && bounds.meets(reader, &swept) {
+            let below = shape.swept(reach + relief);
+            if self.is_over(now, shape, reader, &swept)? && bounds.meets(reader, &below) {
                 self.found.near.push(k);
                 farthest = farthest.max(reach);
             }

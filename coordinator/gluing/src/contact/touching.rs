@@ -2,6 +2,12 @@
 
 use super::shape::Shape;
 use terraglue_ground::{Aabb, Part, Placed, bounds_of};
+use terraglue_subsystem::Geometry;
+
+/// Of the radius of a mesh with dents, how far soil between its lugs may stand out of it.
+const LUGS: f64 = 0.1;
+/// Vertical over radial distance at a rim that meets the soil at 80°.
+const STEEP_RIM: f64 = 6.0;
 
 /// Some shapes of a piece, at least one.
 #[derive(Clone, Copy)]
@@ -47,6 +53,25 @@ impl<'a> Touching<'a> {
         self.main().patch_origin(normal)
     }
 
+    /// Vertical distance by which soil that is caught between grousers may lie below the underside, m: of a cylinder with other shapes how
+    /// far these stand out of it, of a mesh with dents a part of its size; 0 for all others.
+    pub fn relief(&self) -> f64 {
+        let main = self.main();
+        let stands_out = match main.geometry() {
+            _ if !main.is_convex() => LUGS * self.largest.size,
+            Geometry::Cylinder { radius, .. } => self.each().fold(0.0, |most: f64, shape| {
+                let axis = main.rotation().0[2];
+                let out = across(axis, difference(shape.placed.pose().position, main.pose().position));
+                let size = dot(out, out).sqrt();
+                let direction = out.map(|c| c / size);
+                let far = dot(difference(shape.placed.support(direction), main.pose().position), direction);
+                if size > 0.0 { most.max(far - radius) } else { most }
+            }),
+            _ => 0.0,
+        };
+        STEEP_RIM * stands_out
+    }
+
     /// Half of the width of all along a world direction (unit), m.
     pub fn half_width(&self, direction: [f64; 3]) -> f64 {
         if self.which.len() == 1 {
@@ -61,6 +86,16 @@ impl<'a> Touching<'a> {
 /// A shape as the ground sees it.
 pub fn part(shape: &Shape) -> Part<'_> {
     Part { placed: &shape.placed, bounds: &shape.bounds }
+}
+
+fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Part of a vector across a unit vector.
+fn across(axis: [f64; 3], v: [f64; 3]) -> [f64; 3] {
+    let along = dot(axis, v);
+    [0, 1, 2].map(|k| v[k] - along * axis[k])
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -22,12 +22,13 @@ impl Found {
         Self { near: Vec::with_capacity(shapes), hit: Vec::with_capacity(shapes) }
     }
 
-    /// The port of the shapes that come near: of those that have nodes, the others do not count.
+    /// The port of the shapes that come near: of those that have nodes, the others do not count. `reach`: how far any of them can get, and
+    /// [`Touching::relief`] of their piece, m.
     pub fn port(
         &mut self,
         shapes: &[Shape],
         reader: &Reader,
-        reach: f64,
+        reach: [f64; 2],
         nodes: &mut Vec<Node>,
     ) -> Option<Port> {
         self.hit.clear();
@@ -49,16 +50,16 @@ impl Found {
 fn port_of(
     touching: &Touching,
     reader: &Reader,
-    reach: f64,
+    [reach, relief]: [f64; 2],
     hit: &mut [bool],
     nodes: &mut Vec<Node>,
 ) -> Option<Port> {
     let patch = Patch::find(touching, &reader.undisturbed(), reader);
     let vertical = patch.vertical(reach);
-    let first = nodes.len();
+    let (first, below) = (nodes.len(), vertical + relief);
     match touching.single() {
-        Some(shape) => nodes_below(&shape.placed, &Cut(reader), vertical, nodes),
-        None => nodes_below_parts(touching.each().map(part), &Cut(reader), vertical, |k, node| {
+        Some(shape) => nodes_below(&shape.placed, &Cut(reader), below, nodes),
+        None => nodes_below_parts(touching.each().map(part), &Cut(reader), below, |k, node| {
             hit[k] = true;
             nodes.push(node);
         }),

@@ -143,8 +143,10 @@ impl Touch {
         let fastest = wheel.ways(x).into_iter().fold(0.0, |m: f64, way| m.max(way.abs()));
         self.slip = if fastest > STANDS * h { wheel.rolled(x).slip } else { 0.0 };
         self.pull = a * wrench[1] + b * wrench[2];
-        // about the axle, which lies r·n above the port
-        self.torque = wheel.radius * self.pull - (a * wrench[5] - b * wrench[4]);
+        // about the axle
+        let [up, along] = wheel.above();
+        let ahead = along * (a * wheel.heading[0] + b * wheel.heading[1]);
+        self.torque = up * self.pull - ahead * self.normal - (a * wrench[5] - b * wrench[4]);
         self.power = self.torque * (a * x[5] - b * x[4]) / h;
     }
 

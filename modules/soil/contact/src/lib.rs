@@ -28,6 +28,7 @@ mod contact_memory;
 mod contacts;
 mod fold;
 mod ground;
+mod grousers;
 mod law_memory;
 mod mask;
 mod nodes;

@@ -213,8 +213,13 @@ impl Patches {
         self.rows.list(&self.nodes, range.clone());
         let n_z = port.frame[2];
         let spacing = ground.heights.lattice().spacing;
-        let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
-        let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
+        let rolls = port.extent[0] > 0.0 && port.extent[1] > 0.0;
+        let memory = rolls.then(|| recall(&ground.wheels, port.key));
+        let wheel = memory.and_then(|memory| Wheel::find(&self.nodes, range.clone(), spacing, memory));
+        if let Some(wheel) = &wheel {
+            wheel.fill_gaps(&mut self.nodes, port, range.clone());
+        }
+        let wheel = wheel.and_then(|wheel| wheel.loaded(&self.nodes, range.clone(), spacing));
         if !laws.iter().any(|law| law.pressure.keeps()) {
             self.nodes.fill_cells(port, range.clone(), spacing, &mut self.rows);
         }

@@ -14,7 +14,7 @@ use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{Error, Result};
 
 /// Version of the bytes.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
 /// One saved state; `S` is the material's own.
 #[derive(Debug, Default)]

@@ -5,6 +5,7 @@
 //! wheel that leans. A flat foot, whose normals are all alike, and a sphere, which is round in both directions, do not roll.
 
 use crate::contact_memory::Remembered;
+use crate::grousers::{Grousers, Point, Rim, Section};
 use crate::patch_nodes::PatchNodes;
 use terraglue_soil_law::Rolling;
 
@@ -32,19 +33,23 @@ pub struct Memory {
     pub slip: f64,
     /// Whether the way of the axle points along [`Wheel::heading`].
     pub forward: bool,
-    /// Radius of the underside as it was found last, m; 0: never.
+    /// Radius of the underside as it was found last, that of the rim where there are grousers, m; 0: never.
     pub radius: f64,
     /// Direction of travel along t1 and t2, as it was found last.
     pub heading: [f64; 2],
     /// Lean as it was found last, see [`Wheel::lean`].
     pub lean: f64,
+    /// Grousers on the rim.
+    pub grousers: Grousers,
 }
 
 /// A contact that can roll, at the start of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wheel {
-    /// Radius of the underside, m.
+    /// Radius of the underside, that of the tips of grousers, m.
     pub radius: f64,
+    /// The rim between grousers, where it was found in this step.
+    pub rim: Option<Rim>,
     /// Direction of travel along t1 and t2, unit length; its sign is arbitrary.
     pub heading: [f64; 2],
     /// Angle by which the axle leans out of the level: the normal m of the lowest line has the parts cos along n and sin across the
@@ -61,29 +66,45 @@ pub struct Wheel {
 }
 
 impl Wheel {
-    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll. A wheel stays one while it
-    /// is loaded, also where too few nodes are left to look round, as on an edge or a crest.
+    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll. A wheel stays one where too few nodes
+    /// are left to look round, as on an edge or a crest. How far it is in the soil follows from [`Wheel::loaded`].
     pub fn find(
         nodes: &PatchNodes,
         range: std::ops::Range<usize>,
         spacing: f64,
         memory: Memory,
     ) -> Option<Self> {
-        let used =
-            || range.clone().filter(|k| nodes.area[*k] > 0.0 && nodes.facing[*k].inward()[0] > LEANING);
+        let used = || used(nodes, range.clone());
         // at an edge the underside is that of the nearest point, not that at the node: it makes the circle smaller
         let whole = |k: &usize| nodes.area[*k] > WHOLE * spacing * spacing;
         let least = if used().filter(whole).count() < FEW { 0.0 } else { WHOLE * spacing * spacing };
         let inner = || used().filter(move |k| nodes.area[*k] > least);
         let found = heading(inner().map(|k| nodes.facing[k].inward())).and_then(|heading| {
             let lean = lean(inner().map(|k| nodes.facing[k].inward()), heading);
-            let radius = radius(inner().map(|k| (nodes.arm[k], nodes.facing[k].inward())), heading, lean)?;
-            Some((heading, lean, radius))
+            let section = Section::new(heading, lean);
+            let points = inner().map(|k| (section.of(nodes.arm[k]), section.of(nodes.facing[k].inward())));
+            let (radius, rim) = circle(points.clone(), &memory)?;
+            let grousers = rim.map_or(memory.grousers, |rim| memory.grousers.seen(&rim, points));
+            Some((Memory { radius, heading, lean, grousers, ..memory }, rim))
         });
-        let known = (memory.radius > 0.0).then_some((memory.heading, memory.lean, memory.radius));
-        let (heading, lean, radius) = found.or(known)?;
-        let pressed = || used().filter(|k| nodes.depth[*k] > nodes.permanent[*k]);
-        let across = |k: usize| nodes.arm[k][2] * heading[0] - nodes.arm[k][1] * heading[1];
+        let known = (memory.radius > 0.0).then_some((memory, None));
+        let (now, rim) = found.or(known)?;
+        Some(Self {
+            radius: now.radius + now.grousers.height,
+            rim,
+            heading: now.heading,
+            lean: now.lean,
+            first: memory.radius == 0.0,
+            width: 0.0,
+            length: 0.0,
+            memory: now,
+        })
+    }
+
+    /// The same with width and length of its contact; `None` where it does not touch.
+    pub fn loaded(self, nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64) -> Option<Self> {
+        let pressed = || used(nodes, range.clone()).filter(|k| nodes.depth[*k] > nodes.permanent[*k]);
+        let across = |k: usize| nodes.arm[k][2] * self.heading[0] - nodes.arm[k][1] * self.heading[1];
         let (sum, mean) =
             pressed().fold((0.0, 0.0), |(s, m), k| (s + nodes.area[k], m + nodes.area[k] * across(k)));
         if sum <= 0.0 {
@@ -92,31 +113,29 @@ impl Wheel {
         let mean = mean / sum;
         let variance = pressed().map(|k| nodes.area[k] * (across(k) - mean).powi(2)).sum::<f64>() / sum;
         let deepest = pressed().fold(0.0_f64, |m, k| m.max(nodes.depth[k]));
-        Some(Self {
-            radius,
-            heading,
-            lean,
-            first: memory.radius == 0.0,
-            // rows of cells of equal load scatter by (W² − Δ²)/12
-            width: (12.0 * variance + spacing * spacing).sqrt(),
-            length: (deepest * (2.0 * radius - deepest).max(0.0)).sqrt(),
-            memory: Memory { radius, heading, lean, ..memory },
-        })
+        // rows of cells of equal load scatter by (W² − Δ²)/12
+        let width = (12.0 * variance + spacing * spacing).sqrt();
+        let length = (deepest * (2.0 * self.radius - deepest).max(0.0)).sqrt();
+        Some(Self { width, length, ..self })
     }
 
     /// Ways of the rim and of the axle along the heading for a motion `x` (n, t1, t2 and rotations), m.
     pub fn ways(&self, x: &[f64; 6]) -> [f64; 2] {
         let along = |v: [f64; 2]| v[0] * self.heading[0] + v[1] * self.heading[1];
-        // the axle lies r·m above the lowest line: θ × r·m along the heading
+        // the axle lies above the port: θ × r·m along the heading
         let (sin, cos) = (libm::sin(self.lean), libm::cos(self.lean));
-        let rim = self.radius * (cos * along([x[5], -x[4]]) - sin * x[3]);
-        [rim, along([x[1], x[2]]) + rim]
+        let turn = cos * along([x[5], -x[4]]) - sin * x[3];
+        [self.radius * turn, along([x[1], x[2]]) + self.above()[0] * turn]
     }
 
-    /// The axle above the lowest line: along n, t1 and t2, m.
+    /// The axle as seen from the port, towards the axle and along the heading, m: right above the lowest line of a smooth wheel.
+    pub fn above(&self) -> [f64; 2] {
+        self.rim.map_or([self.radius, 0.0], |rim| rim.axle)
+    }
+
+    /// The axle as seen from the port: along n, t1 and t2, m.
     pub fn axle(&self) -> [f64; 3] {
-        let side = self.radius * libm::sin(self.lean);
-        [self.radius * libm::cos(self.lean), -side * self.heading[1], side * self.heading[0]]
+        Section::new(self.heading, self.lean).vector(self.above())
     }
 
     /// Direction along t1 and t2 in which the wheel is driven: that of the larger way of rim and axle.
@@ -151,7 +170,7 @@ impl Wheel {
     /// Angle of a node from the lowest line, rad, positive where soil enters.
     fn angle(&self, arm: [f64; 3]) -> f64 {
         let sign = if self.memory.forward { 1.0 } else { -1.0 };
-        let ahead = sign * (arm[1] * self.heading[0] + arm[2] * self.heading[1]);
+        let ahead = sign * (arm[1] * self.heading[0] + arm[2] * self.heading[1] - self.above()[1]);
         libm::asin((ahead / self.radius).clamp(-1.0, 1.0))
     }
 
@@ -205,6 +224,11 @@ pub struct Shift {
     pub before: f64,
 }
 
+/// Nodes below a wheel that are looked at.
+fn used(nodes: &PatchNodes, range: std::ops::Range<usize>) -> impl Iterator<Item = usize> + Clone {
+    range.filter(|k| nodes.area[*k] > 0.0 && nodes.facing[*k].inward()[0] > LEANING)
+}
+
 /// Direction in which the normals turn; `None` where they are all alike or turn in both.
 fn heading(normals: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 2]> {
     let (mut count, mut mean, mut square) = (0.0, [0.0; 2], [0.0; 3]);
@@ -238,19 +262,22 @@ fn lean(normals: impl Iterator<Item = [f64; 3]>, heading: [f64; 2]) -> f64 {
     libm::atan2(across, up)
 }
 
-/// Radius of the circle on which the nodes lie; `None` where they lie on none.
-fn radius(
-    nodes: impl Iterator<Item = ([f64; 3], [f64; 3])> + Clone,
-    heading: [f64; 2],
-    lean: f64,
-) -> Option<f64> {
-    let (sin, cos) = (libm::sin(lean), libm::cos(lean));
-    let pairs = nodes.map(|(arm, nu)| {
-        let across = |v: [f64; 3]| v[2] * heading[0] - v[1] * heading[1];
-        let plane = |v: [f64; 3]| [cos * v[0] + sin * across(v), v[1] * heading[0] + v[2] * heading[1]];
-        let [up, along] = plane(nu);
-        (plane(arm), [1.0 - up, -along])
-    });
+/// Radius of the circle on which the points lie, and the rim where grousers stand out of it or were known to do so; `None` where they
+/// lie on none.
+fn circle(points: impl Iterator<Item = Point> + Clone, known: &Memory) -> Option<(f64, Option<Rim>)> {
+    let (plain, bare) = (radius(points.clone()), known.grousers.height == 0.0);
+    let even = plain.filter(|radius| bare && Rim::is_even(*radius, points.clone()));
+    if let Some(radius) = even {
+        return Some((radius, None));
+    }
+    let start = if bare { 0.0 } else { known.radius };
+    let rim = Rim::find(points, start).map(|rim| (rim.radius, Some(rim)));
+    rim.or_else(|| plain.filter(|_| bare).map(|radius| (radius, None)))
+}
+
+/// Radius of the circle through the port on which the points lie; `None` where they lie on none.
+fn radius(points: impl Iterator<Item = Point> + Clone) -> Option<f64> {
+    let pairs = points.map(|(arm, [up, along])| (arm, [1.0 - up, -along]));
     let of = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
     let (product, square) = pairs.clone().fold((0.0, 0.0), |(p, s), (a, b)| (p + of(a, b), s + of(b, b)));
     if square <= 0.0 || product <= 0.0 {
@@ -274,7 +301,7 @@ impl Remembered for Memory {
     }
 }
 
-terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading, lean });
+terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading, lean, grousers });
 
 #[cfg(test)]
 mod tests {
@@ -315,7 +342,8 @@ mod tests {
     }
 
     fn find(nodes: &PatchNodes) -> Option<Wheel> {
-        Wheel::find(nodes, 0..nodes.index.len(), 0.01, recall(&[], 1))
+        let all = 0..nodes.index.len();
+        Wheel::find(nodes, all.clone(), 0.01, recall(&[], 1))?.loaded(nodes, all, 0.01)
     }
 
     #[test]
@@ -360,7 +388,8 @@ mod tests {
         assert_eq!(Wheel::find(&whole, row.clone(), 0.01, recall(&[], 1)), None);
         let mut nodes = whole.clone();
         nodes.permanent.fill(-1.0);
-        let kept = Wheel::find(&nodes, row, 0.01, seen.memory).expect("a wheel");
+        let kept = Wheel::find(&nodes, row.clone(), 0.01, seen.memory).expect("a wheel");
+        assert!(kept.loaded(&nodes, row, 0.01).is_some());
         assert_eq!((kept.radius, kept.heading), (seen.radius, seen.heading));
     }
 

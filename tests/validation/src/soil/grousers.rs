@@ -111,6 +111,12 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         "least gain of drawbar pull by 24 grousers of 5 mm over the smooth wheel, N",
     ));
     all.push(Figure::new(
+        all_slips("outer"),
+        most(&mut each().map(|w| (w[1].pull - w[2].pull).abs())),
+        Limit::AtMost(0.2),
+        "largest difference of its drawbar pull from that of the cylinder on which the tips lie, N",
+    ));
+    all.push(Figure::new(
         all_slips("sinkage"),
         most(&mut each().map(|w| w[1].sinkage / w[2].sinkage)),
         Limit::AtMost(1.1),

@@ -28,6 +28,8 @@ const BY_NORMALS: [f64; 2] = [0.3, 0.1];
 const BY_DISTANCES: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 /// Part of the nodes that must lie on the rim.
 const ON_RIM: f64 = 0.3;
+/// Squared part of a normal across the axle from which on it is one of the rim or of grousers.
+const ACROSS: f64 = 0.98;
 /// A rim has this many faces or more; normals that differ by less are those of one.
 const FACES: usize = 5;
 const ALIKE: f64 = 1e-6;
@@ -86,6 +88,11 @@ pub struct Rim {
 
 /// A point of the underside and its inward normal, both in the section.
 pub type Point = ([f64; 2], [f64; 2]);
+
+/// Whether the underside is that of a rim or of grousers there, and not that of the end of a cylinder that leans.
+pub fn is_across((_, nu): &Point) -> bool {
+    nu[0] * nu[0] + nu[1] * nu[1] > ACROSS
+}
 
 impl Rim {
     /// Whether none of the points lies outside the circle of a radius (m) through the port.
@@ -257,7 +264,11 @@ impl Wheel {
         let section = Section::new(self.heading, self.lean);
         let vertical = section.of([0, 1, 2].map(|c| port.direction(c)[2]));
         for k in range {
-            let p = section.of(nodes.arm[k]);
+            let point = (section.of(nodes.arm[k]), section.of(nodes.facing[k].inward()));
+            if !is_across(&point) {
+                continue;
+            }
+            let (p, _) = point;
             let from = [p[0] - rim.axle[0], p[1] - rim.axle[1]];
             let Some(falls) = below(from, vertical, self.radius) else { continue };
             if falls > NOTHING {

@@ -5,8 +5,9 @@
 //! wheel that leans. A flat foot, whose normals are all alike, and a sphere, which is round in both directions, do not roll.
 
 use crate::contact_memory::Remembered;
-use crate::grousers::{Grousers, Point, Rim, Section};
+use crate::grousers::{Grousers, Point, Rim, Section, is_across};
 use crate::patch_nodes::PatchNodes;
+use crate::vectors::dot;
 use terraglue_soil_law::Rolling;
 
 /// Largest squared distance of nodes from the circle over their squared distance from the lowest line.
@@ -79,12 +80,19 @@ impl Wheel {
         let whole = |k: &usize| nodes.area[*k] > WHOLE * spacing * spacing;
         let least = if used().filter(whole).count() < FEW { 0.0 } else { WHOLE * spacing * spacing };
         let inner = || used().filter(move |k| nodes.area[*k] > least);
-        let found = heading(inner().map(|k| nodes.facing[k].inward())).and_then(|heading| {
-            let lean = lean(inner().map(|k| nodes.facing[k].inward()), heading);
+        let normals = || inner().map(|k| nodes.facing[k].inward());
+        let axle = heading(normals()).and_then(|heading| across_axle(normals(), heading));
+        let found = axle.and_then(|(heading, lean)| {
             let section = Section::new(heading, lean);
             let points = inner().map(|k| (section.of(nodes.arm[k]), section.of(nodes.facing[k].inward())));
-            let (radius, rim) = circle(points.clone(), &memory)?;
-            let grousers = rim.map_or(memory.grousers, |rim| memory.grousers.seen(&rim, points));
+            // few nodes at edges do not tell a rim behind grousers
+            let tells = least > 0.0 || memory.grousers.height > 0.0;
+            let (radius, rim) = match tells {
+                true => circle(points.clone(), &memory)?,
+                false => (radius(points.clone())?, None),
+            };
+            let grousers =
+                rim.map_or(memory.grousers, |rim| memory.grousers.seen(&rim, points.filter(is_across)));
             Some((Memory { radius, heading, lean, grousers, ..memory }, rim))
         });
         let known = (memory.radius > 0.0).then_some((memory, None));
@@ -255,11 +263,28 @@ fn heading(normals: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 2]> 
     (length > 0.0).then(|| v.map(|c| sign * c / length))
 }
 
-/// Angle between the axle and the level, rad: all normals of a cylinder are across its axle.
-fn lean(normals: impl Iterator<Item = [f64; 3]>, heading: [f64; 2]) -> f64 {
-    let (up, across) = normals
-        .fold((0.0, 0.0), |(up, across), nu| (up + nu[0], across + nu[2] * heading[0] - nu[1] * heading[1]));
-    libm::atan2(across, up)
+/// Heading and lean of the axle to which all normals of a cylinder are perpendicular; `heading` says roughly, and with its sign, where it
+/// goes. The axle spans the null space of Σ ν νᵀ, as the cross product of two of its rows does.
+fn across_axle(normals: impl Iterator<Item = [f64; 3]>, heading: [f64; 2]) -> Option<([f64; 2], f64)> {
+    let mut rows = [[0.0; 3]; 3];
+    for nu in normals {
+        for (row, a) in rows.iter_mut().zip(nu) {
+            row.iter_mut().zip(nu).for_each(|(sum, b)| *sum += a * b);
+        }
+    }
+    let axles = [[0, 1], [1, 2], [2, 0]].map(|[a, b]| cross(rows[a], rows[b]));
+    let axle = axles.into_iter().fold([0.0; 3], |most, a| if dot(a, a) > dot(most, most) { a } else { most });
+    let level = (axle[1] * axle[1] + axle[2] * axle[2]).sqrt();
+    if level <= 0.0 {
+        return None;
+    }
+    let ahead = [axle[2] / level, -axle[1] / level];
+    let sign = if ahead[0] * heading[0] + ahead[1] * heading[1] < 0.0 { -1.0 } else { 1.0 };
+    Some((ahead.map(|c| sign * c), libm::atan2(-sign * axle[0], level)))
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Radius of the circle on which the points lie, and the rim where grousers stand out of it or were known to do so; `None` where they
@@ -271,7 +296,7 @@ fn circle(points: impl Iterator<Item = Point> + Clone, known: &Memory) -> Option
         return Some((radius, None));
     }
     let start = if bare { 0.0 } else { known.radius };
-    let rim = Rim::find(points, start).map(|rim| (rim.radius, Some(rim)));
+    let rim = Rim::find(points.filter(is_across), start).map(|rim| (rim.radius, Some(rim)));
     rim.or_else(|| plain.filter(|_| bare).map(|radius| (radius, None)))
 }
 

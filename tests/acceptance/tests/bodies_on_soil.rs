@@ -31,7 +31,7 @@ fn mesh(folder: &Path) -> String {
     "<mesh filename=\"ball.obj\"/>".into()
 }
 
-/// A testbed of 1 ms and 10 mm with the `robot` of a model on LETE sand; `terrain`: its keys but the spacing.
+/// A testbed of 1 ms with the `robot` of a model on LETE sand; `terrain`: its keys.
 fn testbed(place: &Path, urdf: &str, terrain: &str, soil: &str, strategy: &str, robot: &str) -> Testbed {
     std::fs::write(place.join("robot.urdf"), urdf).expect("a model");
     let text = format!(
@@ -43,7 +43,6 @@ duration_s = 1.0
 gravity_m_s2 = [0.0, 0.0, -9.81]
 [terrain]
 {terrain}
-spacing_m = 0.01
 [gluing]
 strategy = "{strategy}"
 [soil]
@@ -88,7 +87,7 @@ fn ball(shape: &str, soil: &str, strategy: &str) -> Testbed {
     testbed(
         place.path(),
         &format!("<robot name=\"r\">{body}</robot>"),
-        "kind = \"flat\"\nsize_m = [2.0, 0.6]",
+        "kind = \"flat\"\nsize_m = [2.0, 0.6]\nspacing_m = 0.01",
         &format!("module = \"{soil}\""),
         strategy,
         "position_m = [-0.7, 0.0021, 0.05]\nvelocity_m_s = [0.5, 0.0, 0.0]\nrotation_rate_rad_s = [0.0, 10.0, 0.0]",
@@ -136,7 +135,7 @@ fn a_smooth_sled_is_not_held_back_by_the_edge_of_its_sole() {
         let mut testbed = testbed(
             place.path(),
             &format!("<robot name=\"r\">{sled}</robot>"),
-            &format!("kind = \"slope\"\nsize_m = [1.2, 1.2]\n{terrain}"),
+            &format!("kind = \"slope\"\nsize_m = [1.2, 1.2]\nspacing_m = 0.01\n{terrain}"),
             &format!("module = \"{soil}\"\n{smooth}"),
             "cooperative",
             &format!("position_m = [{}, {}, {}]\nplace_on_ground = false", above * x, above * y, above * z),
@@ -169,7 +168,7 @@ fn two_plates_that_share_cells_bear_as_one() {
         let mut testbed = testbed(
             place.path(),
             &format!("<robot name=\"r\"><link name=\"frame\"/>{press}{body}{welded}</robot>"),
-            "kind = \"flat\"\nsize_m = [0.6, 0.6]",
+            "kind = \"flat\"\nsize_m = [0.6, 0.6]\nspacing_m = 0.01",
             &format!("module = \"{soil}\"\nk_c = 0.0"),
             "cooperative",
             &format!(
@@ -189,5 +188,108 @@ fn two_plates_that_share_cells_bear_as_one() {
                 assert!((two / one - 1.0).abs() < 1e-9, "{soil}, {y} m: {two} and {one} N");
             }
         }
+    }
+}
+
+const RIM: f64 = 0.044;
+const LUGS: i32 = 20;
+
+/// A wheel whose axle is y with plates on its rim, as a cylinder and boxes.
+fn wheel_with_plates() -> String {
+    let mut all =
+        collision(&format!("<cylinder radius=\"{RIM}\" length=\"0.1\"/>"), [0.0; 3], [PI / 2.0, 0.0, 0.0]);
+    let (middle, height) = (0.5 * (RADIUS + RIM - 0.002), RADIUS - RIM + 0.002);
+    for k in 0..LUGS {
+        let angle = TAU * f64::from(k) / f64::from(LUGS);
+        let plate = format!("<box size=\"0.002 0.1 {height}\"/>");
+        all += &collision(&plate, [middle * angle.sin(), 0.0, middle * angle.cos()], [0.0, angle, 0.0]);
+    }
+    all
+}
+
+/// The same as a mesh whose lugs are 6 mm thick, as OBJ.
+fn wheel_with_lugs(folder: &Path) -> String {
+    let (facets, half) = (8, 0.003 / RADIUS);
+    let mut outline = Vec::new();
+    for k in 0..LUGS {
+        let angle = TAU * f64::from(k) / f64::from(LUGS);
+        outline.extend([
+            (angle - half, RIM),
+            (angle - half, RADIUS),
+            (angle + half, RADIUS),
+            (angle + half, RIM),
+        ]);
+        let gap = TAU / f64::from(LUGS) - 2.0 * half;
+        outline.extend((1..facets).map(|n| (angle + half + gap * f64::from(n) / f64::from(facets), RIM)));
+    }
+    let mut text = String::new();
+    for y in [-0.05, 0.05] {
+        for (angle, radius) in &outline {
+            writeln!(text, "v {} {y} {}", radius * angle.sin(), radius * angle.cos()).expect("text");
+        }
+    }
+    text += "v 0 -0.05 0\nv 0 0.05 0\n";
+    let count = outline.len();
+    for k in 0..count {
+        let (a, b) = (k + 1, (k + 1) % count + 1);
+        let (c, d) = (a + count, b + count);
+        writeln!(
+            text,
+            "f {a} {b} {c}\nf {b} {d} {c}\nf {} {b} {a}\nf {} {c} {d}",
+            2 * count + 1,
+            2 * count + 2
+        )
+        .expect("text");
+    }
+    std::fs::write(folder.join("lugs.obj"), text).expect("a mesh");
+    collision("<mesh filename=\"lugs.obj\"/>", [0.0; 3], [0.0; 3])
+}
+
+/// Kinetic energy (J) and way (m) of a free wheel that has rolled for 0.4 s in the direction `yaw` (rad).
+fn wheel_rolled(shape: &str, soil: &str, strategy: &str, yaw: f64) -> [f64; 2] {
+    let place = tempfile::tempdir().expect("folder");
+    let shapes = match shape {
+        "plates" => wheel_with_plates(),
+        "lugs" => wheel_with_lugs(place.path()),
+        _ => collision(
+            &format!("<cylinder radius=\"{RADIUS}\" length=\"0.1\"/>"),
+            [0.0; 3],
+            [PI / 2.0, 0.0, 0.0],
+        ),
+    };
+    let body = link("b", MASS, 0.4 * MASS * RADIUS * RADIUS, &shapes);
+    let (sin, cos) = yaw.sin_cos();
+    let start = format!(
+        "position_m = [-0.3, 0.0021, 0.05]\nheading_rad = {yaw:?}\nvelocity_m_s = [{}, {}, 0.0]\n\
+         rotation_rate_rad_s = [{}, {}, 0.0]",
+        0.5 * cos,
+        0.5 * sin,
+        -10.0 * sin,
+        10.0 * cos,
+    );
+    let terrain = "kind = \"flat\"\nsize_m = [1.4, 1.4]\nspacing_m = 0.005";
+    let urdf = format!("<robot name=\"r\">{body}</robot>");
+    let mut testbed =
+        testbed(place.path(), &urdf, terrain, &format!("module = \"{soil}\""), strategy, &start);
+    steps(&mut testbed, 400);
+    let way = (read(&testbed, "robot.b.x") + 0.3).hypot(read(&testbed, "robot.b.y") - 0.0021);
+    [testbed.energy().kinetic, way]
+}
+
+/// Plates and lugs began the shear of a node anew whenever one came over it. A mesh whose lugs are as wide as a cell rolls over some of them before
+/// two are seen at a time.
+#[test]
+fn a_wheel_with_grousers_rolls_as_the_cylinder_of_their_tips() {
+    let start = 0.7 * MASS * 0.5 * 0.5;
+    for (soil, strategy, yaw, shape, part) in [
+        ("soil-bekker", "iterative", 0.6, "plates", 0.02),
+        ("soil-cellular-automaton", "cooperative", 0.0, "plates", 0.02),
+        ("soil-bekker", "cooperative", 0.0, "lugs", 0.1),
+    ] {
+        let [energy, way] = wheel_rolled("cylinder", soil, strategy, yaw);
+        let [own, own_way] = wheel_rolled(shape, soil, strategy, yaw);
+        println!("{soil} {strategy} {yaw} {shape}: {energy} {own} J, {way} {own_way} m");
+        assert!((own - energy).abs() < part * start, "{soil}, {strategy}, {shape}: {own} and {energy} J");
+        assert!((own_way - way).abs() < part * way, "{soil}, {strategy}, {shape}: {own_way} and {way} m");
     }
 }

@@ -27,7 +27,7 @@ const MOST: usize = 32;
 const BY_NORMALS: [f64; 2] = [0.3, 0.1];
 const BY_DISTANCES: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 /// Part of the nodes that must lie on the rim.
-const ON_RIM: f64 = 0.3;
+const ON_RIM: f64 = 0.5;
 /// Squared part of a normal across the axle from which on it is one of the rim or of grousers.
 const ACROSS: f64 = 0.98;
 /// A rim has this many faces or more; normals that differ by less are those of one.
@@ -106,11 +106,19 @@ impl Rim {
     /// (Gauss–Newton), which do not care that the faces of a mesh are flat. `None` where no circle has enough of them, some lie
     /// inside, or few faces make it, as those of a box on its edge.
     ///
-    /// `known`: radius of the rim as it was found before, m, or 0: the start where normals of the sides of grousers lead astray.
+    /// `known`: radius of the rim as it was found before, m, or 0. It stays where few nodes tell a new one.
     pub fn find(points: impl Iterator<Item = Point> + Clone, known: f64) -> Option<Self> {
-        let from = |start: Option<Self>| start.and_then(|rim| rim.refined(points.clone()));
-        let known = (known > 0.0).then(|| Self::of_radius(known, points.clone()));
-        from(known).or_else(|| from(Self::roughly(points.clone())))
+        if known <= 0.0 {
+            return Self::roughly(points.clone())?.refined(points);
+        }
+        let rough = Self::of_radius(known, points.clone());
+        let fine = rough.refined(points.clone()).filter(|rim| rim.has(known));
+        fine.or_else(|| points.into_iter().all(|(p, _)| rough.may_hold(p)).then_some(rough))
+    }
+
+    /// Whether its radius is another one, m.
+    pub fn has(&self, radius: f64) -> bool {
+        (self.radius - radius).abs() < HEIGHTS[0] * radius
     }
 
     /// Where most of the points see the axle of a rim of this radius (m): mean shift.
@@ -137,12 +145,13 @@ impl Rim {
         }
         let (mut all, mut near, mut faces, mut count) = (0.0, 0.0, [[0.0; 2]; FACES], 0);
         for (p, nu) in points {
-            let off = (distance(p, rim.axle) - rim.radius) / rim.radius;
             all += 1.0;
-            if !(-HEIGHTS[0]..HEIGHTS[1]).contains(&off) {
+            if !rim.may_hold(p) {
                 return None;
             }
-            if off < HEIGHTS[0] {
+            let [up, along] = [rim.axle[0] - p[0], rim.axle[1] - p[1]];
+            let size = (up * up + along * along).sqrt();
+            if size < (1.0 + HEIGHTS[0]) * rim.radius && up * nu[0] + along * nu[1] > RADIAL * size {
                 near += 1.0;
                 if count < FACES && faces[..count].iter().all(|face| distance(*face, nu) > ALIKE) {
                     faces[count] = nu;
@@ -153,6 +162,13 @@ impl Rim {
         (near > ON_RIM * all && count == FACES).then_some(rim)
     }
 
+    /// Whether a point may be one of the rim or of grousers.
+    fn may_hold(&self, p: [f64; 2]) -> bool {
+        let off = distance(p, self.axle) / self.radius - 1.0;
+        (-HEIGHTS[0]..HEIGHTS[1]).contains(&off)
+    }
+
+    /// From nothing.
     fn roughly(points: impl Iterator<Item = Point> + Clone) -> Option<Self> {
         let mut rim = Self::by_normals(points.clone().map(|(p, nu)| (p, nu, 1.0)))?;
         for scale in BY_NORMALS {
@@ -224,10 +240,15 @@ fn weight(off: f64, scale: f64) -> f64 {
 }
 
 impl Grousers {
+    /// Whether two of them were seen at a time.
+    pub fn is_sure(&self) -> bool {
+        self.pitch > 0.0
+    }
+
     /// Whether a plane that touches two of them does not touch the rim.
     fn are_close(&self, rim: &Rim) -> bool {
         let rises = (rim.radius + self.height) * (1.0 - libm::cos(0.5 * self.pitch));
-        self.pitch > 0.0 && rises <= self.height
+        self.is_sure() && rises <= self.height
     }
 
     /// With what the points of a wheel with this rim show.

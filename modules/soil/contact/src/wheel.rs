@@ -86,13 +86,14 @@ impl Wheel {
             let section = Section::new(heading, lean);
             let points = inner().map(|k| (section.of(nodes.arm[k]), section.of(nodes.facing[k].inward())));
             // few nodes at edges do not tell a rim behind grousers
-            let tells = least > 0.0 || memory.grousers.height > 0.0;
+            let tells = least > 0.0 || memory.grousers.is_sure();
             let (radius, rim) = match tells {
                 true => circle(points.clone(), &memory)?,
                 false => (radius(points.clone())?, None),
             };
-            let grousers =
-                rim.map_or(memory.grousers, |rim| memory.grousers.seen(&rim, points.filter(is_across)));
+            let before = Some(memory.grousers).filter(|_| rim.is_some_and(|rim| rim.has(memory.radius)));
+            let before = before.unwrap_or_default();
+            let grousers = rim.map_or(before, |rim| before.seen(&rim, points.filter(is_across)));
             Some((Memory { radius, heading, lean, grousers, ..memory }, rim))
         });
         let known = (memory.radius > 0.0).then_some((memory, None));
@@ -290,14 +291,16 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 /// Radius of the circle on which the points lie, and the rim where grousers stand out of it or were known to do so; `None` where they
 /// lie on none.
 fn circle(points: impl Iterator<Item = Point> + Clone, known: &Memory) -> Option<(f64, Option<Rim>)> {
-    let (plain, bare) = (radius(points.clone()), known.grousers.height == 0.0);
-    let even = plain.filter(|radius| bare && Rim::is_even(*radius, points.clone()));
+    if known.grousers.is_sure() {
+        return Rim::find(points.filter(is_across), known.radius).map(|rim| (rim.radius, Some(rim)));
+    }
+    let plain = radius(points.clone());
+    let even = plain.filter(|radius| Rim::is_even(*radius, points.clone()));
     if let Some(radius) = even {
         return Some((radius, None));
     }
-    let start = if bare { 0.0 } else { known.radius };
-    let rim = Rim::find(points.filter(is_across), start).map(|rim| (rim.radius, Some(rim)));
-    rim.or_else(|| plain.filter(|_| bare).map(|radius| (radius, None)))
+    let rim = Rim::find(points.filter(is_across), 0.0).map(|rim| (rim.radius, Some(rim)));
+    rim.or_else(|| plain.map(|radius| (radius, None)))
 }
 
 /// Radius of the circle through the port on which the points lie; `None` where they lie on none.

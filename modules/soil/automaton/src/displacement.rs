@@ -91,10 +91,10 @@ impl Site<'_> {
     /// the most.
     fn liftable(&self, [i, j]: [i32; 2], places: &[Option<Place>; 8], sum: f64) -> i32 {
         let heights = &self.ground.heights;
-        let (mut higher, mut spread) = (0.0, 1.0);
+        let (own, mut higher, mut spread) = (heights.units(i, j), 0.0, 1.0);
         for ([a, b], weight) in places.iter().flatten().filter(|_| sum > 0.0) {
             let share = weight / sum;
-            higher += share * f64::from(heights.units(*a, *b) - heights.units(i, j));
+            higher += share * f64::from(heights.units(*a, *b) - own);
             spread += share * share;
         }
         // compacted material is not lifted: spread·n² + 2·higher·n = most of the rest

@@ -315,19 +315,20 @@ fn add_stiffness(sum: &mut Stiffness, arm: [f64; 3], node: &[[f64; 3]; 3], momen
         }
         return;
     }
+    // B is the identity beside the matrix of θ × arm: only its terms that are not zero
     let [r_n, r_1, r_2] = arm;
-    let b =
-        [[1.0, 0.0, 0.0, 0.0, r_2, -r_1], [0.0, 1.0, 0.0, -r_2, 0.0, r_n], [0.0, 0.0, 1.0, r_1, -r_n, 0.0]];
     let mut kb = [[0.0; 6]; 3];
-    for (row, values) in kb.iter_mut().zip(node) {
-        for (value, b) in values.iter().zip(&b) {
-            row.iter_mut().zip(b).for_each(|(r, b)| *r += value * b);
-        }
+    for (row, [k_n, k_1, k_2]) in kb.iter_mut().zip(node) {
+        *row = [*k_n, *k_1, *k_2, k_2 * r_1 - k_1 * r_2, k_n * r_2 - k_2 * r_n, k_1 * r_n - k_n * r_1];
     }
-    for (b, kb) in b.iter().zip(&kb) {
-        for (row, b) in sum.iter_mut().zip(b) {
-            row.iter_mut().zip(kb).for_each(|(r, k)| *r += b * k);
-        }
+    for c in 0..6 {
+        let [n, a, b] = [kb[0][c], kb[1][c], kb[2][c]];
+        sum[0][c] += n;
+        sum[1][c] += a;
+        sum[2][c] += b;
+        sum[3][c] = sum[3][c] - r_2 * a + r_1 * b;
+        sum[4][c] = sum[4][c] + r_2 * n - r_n * b;
+        sum[5][c] = sum[5][c] - r_1 * n + r_n * a;
     }
 }
 

@@ -126,6 +126,11 @@ impl Compatibility {
 
 /// Adds the rows of K·G that belong to one port: `block` of K at the components `place`.
 fn add_product(place: &[Option<usize>; 6], block: &Stiffness, g: &[f64], matrix: &mut [f64], n: usize) {
+    if let [Some(first), .., Some(last)] = *place
+        && last == first + 5
+    {
+        return add_whole(first, block, g, matrix, n);
+    }
     for (out, g) in matrix.chunks_exact_mut(n).zip(g.chunks_exact(n)) {
         for (row, r) in block.iter().zip(place) {
             let Some(r) = r else { continue };
@@ -136,6 +141,36 @@ fn add_product(place: &[Option<usize>; 6], block: &Stiffness, g: &[f64], matrix:
             }
         }
     }
+}
+
+/// The same for a port that carries all six components, from `first` on: its rows side by side.
+fn add_whole(first: usize, block: &Stiffness, g: &[f64], matrix: &mut [f64], n: usize) {
+    let mut columns = [[0.0; 6]; 6];
+    for (c, column) in columns.iter_mut().enumerate() {
+        for (k, row) in column.iter_mut().zip(block) {
+            *k = row[c];
+        }
+    }
+    for (out, g) in matrix.chunks_exact_mut(n).zip(g.chunks_exact(n)) {
+        let (Some(out), Some(g)) = (six_mut(out, first), six(g, first)) else { return };
+        let mut sum = *out;
+        for (column, g) in columns.iter().zip(g) {
+            for (s, k) in sum.iter_mut().zip(column) {
+                *s += k * g;
+            }
+        }
+        *out = sum;
+    }
+}
+
+#[inline]
+fn six(all: &[f64], first: usize) -> Option<&[f64; 6]> {
+    all.get(first..)?.first_chunk()
+}
+
+#[inline]
+fn six_mut(all: &mut [f64], first: usize) -> Option<&mut [f64; 6]> {
+    all.get_mut(first..)?.first_chunk_mut()
 }
 
 /// Gauss's elimination of [A | b] (column-major n × (n + 1)) with the largest pivot of each column; whether there is one.

@@ -66,6 +66,12 @@ impl Marks {
     #[inline]
     pub fn mark(&mut self, [i, j]: [i32; 2]) {
         let (tile, k) = self.lattice.locate(i as u32, j as u32);
+        self.mark_at(tile, k);
+    }
+
+    /// Adds node k of a tile.
+    #[inline]
+    pub fn mark_at(&mut self, tile: usize, k: usize) {
         let (row, column) = (k / TILE_EDGE as usize, k % TILE_EDGE as usize);
         let bits = &mut self.bits[tile];
         if bits.any == 0 {

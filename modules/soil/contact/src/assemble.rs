@@ -104,7 +104,7 @@ impl Patches {
     pub fn at_rest(&self, p: usize) -> Result<([f64; 6], f64)> {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
         let n = &self.nodes;
-        let mut bound = Bound::new(n.doubles);
+        let mut bound = None;
         self.try_each_answer(p, &[0.0; 6], |k, pressure, _, r| {
             // changes of the bearing capacity by shear and motion of the last step belong to the step that begins
             let committed = n.stamp[k] != 0 && n.before[k] > 0.0 && pressure > 0.0;
@@ -115,6 +115,7 @@ impl Patches {
             // soil that clings under tension holds nothing along the underside
             let (pressed, slip) = (pressure.max(0.0), n.shear[k].slip);
             if shear.is_batched() {
+                let bound = bound.get_or_insert_with(|| Bound::new(n.doubles));
                 strength += bound.add(&self.laws, n.law[k], inclined, [pressed, slip], n.kept(k))?;
             } else {
                 strength += inclined * shear.yield_stress(pressed, slip, n.mobilised[k], n.kept(k))?;
@@ -125,7 +126,8 @@ impl Patches {
         // of the sides of a closed outline at most half look one way
         let sides = &self.sides[self.ports[p].wall.sides.clone()];
         strength += 0.5 * sides.iter().map(|side| side.force).sum::<f64>();
-        Ok((sum, strength + bound.take(&self.laws)?))
+        let waiting = bound.as_mut().map_or(Ok(0.0), |bound| bound.take(&self.laws))?;
+        Ok((sum, strength + waiting))
     }
 
     /// Force of patch `p` on the body along n at `x`, N, and by how much it falls with X_n, N/m.

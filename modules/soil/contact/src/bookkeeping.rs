@@ -224,7 +224,8 @@ impl Scene<'_> {
             let curve = &self.patches.law(k).curve;
             let mut kept = KeptContact::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
-            let pressure = self.pressure(k, depth, asked.map(|(pressure, _)| pressure), &mut kept)?;
+            let (pressure, yields) =
+                self.pressure(k, depth, asked.map(|(pressure, _)| pressure), &mut kept)?;
             let [i, j] = n.index[k];
             let (mut covered, deep) = covered(n, k, [depth, pressure], patch.slope);
             if pressure > 0.0 {
@@ -242,7 +243,11 @@ impl Scene<'_> {
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
                 covered.flow = flow_along(port, moved);
-                covered.virgin = if kept_by_law(curve) { pressure } else { self.patches.yields(k, depth)?.0 };
+                covered.virgin = match yields {
+                    Some(yields) => yields,
+                    None if kept_by_law(curve) => pressure,
+                    None => self.patches.yields(k, depth)?.0,
+                };
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
                 turnover.work -= dot(n.force(k, pressure, [0.0; 2]), moved);
@@ -333,12 +338,19 @@ impl Scene<'_> {
         ledger.elastic += held;
     }
 
-    /// The pressure at node k, evaluated unless `asked`, and the state that a law keeps.
-    fn pressure(&self, k: usize, depth: f64, asked: Option<f64>, out: &mut KeptContact) -> Result<f64> {
+    /// The pressure at node k, evaluated unless `asked`, that at which it yields where that was needed, and the state that a
+    /// law keeps.
+    fn pressure(
+        &self,
+        k: usize,
+        depth: f64,
+        asked: Option<f64>,
+        out: &mut KeptContact,
+    ) -> Result<(f64, Option<f64>)> {
         match asked {
-            _ if kept_by_law(&self.patches.law(k).curve) => self.kept(k, depth, out),
-            Some(pressure) => Ok(pressure),
-            None => Ok(self.patches.pressure(k, depth)?.0),
+            _ if kept_by_law(&self.patches.law(k).curve) => Ok((self.kept(k, depth, out)?, None)),
+            Some(pressure) => Ok((pressure, None)),
+            None => self.patches.pressure_and_yield(k, depth).map(|((p, _), yields)| (p, yields)),
         }
     }
 

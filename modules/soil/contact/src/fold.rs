@@ -26,6 +26,15 @@ pub struct Underside {
     pub steeper: f64,
 }
 
+impl Underside {
+    /// Of one plane alone.
+    pub fn of(plane: &Plane, spacing: f64, ground: [f64; 2]) -> Self {
+        let tilt = [0, 1].map(|c| plane.slope[c] - ground[c]);
+        let variance = spacing * spacing / 12.0 * (tilt[0] * tilt[0] + tilt[1] * tilt[1]);
+        Self { rise: 0.0, variance, slope: plane.slope, steeper: 1.0 }
+    }
+}
+
 /// The planes that meet in a cell. The envelope faces as its part in the soil does: the faces of a wedge in the soil press it, not those
 /// above.
 pub struct Fold {
@@ -53,13 +62,10 @@ impl Fold {
 
     /// The underside where the soil lies `level` (m) above the node.
     pub fn underside(&self, level: f64) -> Underside {
-        let own = self.planes[0];
-        if self.count > 1 {
-            return self.envelope(level);
+        match self.count {
+            1 => Underside::of(&self.planes[0], self.spacing, self.ground),
+            _ => self.envelope(level),
         }
-        let tilt = [0, 1].map(|c| own.slope[c] - self.ground[c]);
-        let variance = self.spacing * self.spacing / 12.0 * (tilt[0] * tilt[0] + tilt[1] * tilt[1]);
-        Underside { rise: 0.0, variance, slope: own.slope, steeper: 1.0 }
     }
 
     fn envelope(&self, level: f64) -> Underside {

@@ -16,6 +16,7 @@
 //! give another answer, and the one with the smaller defect counts.
 
 use crate::lcp::{Lemke, Outcome};
+use terraglue_numerics::dense::multiply_add;
 use terraglue_numerics::in_place::{cholesky, cholesky_above, cholesky_solve, lu, lu_solve, rank};
 use terraglue_subsystem::Port;
 
@@ -570,12 +571,8 @@ fn residual(p: &Problem, t: &[f64], i: usize) -> f64 {
 /// [`residual`] of all components, column by column.
 fn residuals(p: &Problem, t: &[f64], out: &mut Vec<f64>) {
     out.clear();
-    out.resize(p.gap.len(), -0.0);
-    for (column, t) in p.g.chunks_exact(p.gap.len().max(1)).zip(t) {
-        if *t != 0.0 {
-            out.iter_mut().zip(column).for_each(|(o, g)| *o += g * t);
-        }
-    }
+    out.resize(p.gap.len(), 0.0);
+    multiply_add(p.g, t, out);
     out.iter_mut().zip(p.gap).for_each(|(o, gap)| *o += gap);
 }
 

@@ -112,6 +112,8 @@ pub struct Scene<'a> {
     pub patches: &'a Patches,
     /// Length of the step, s.
     pub h: f64,
+    /// Whether [`Covered::virgin`] is asked for.
+    pub virgin: bool,
 }
 
 /// A node that the foot presses: its number in the arrays, depth and displacement.
@@ -245,6 +247,7 @@ impl Scene<'_> {
                 covered.flow = flow_along(port, moved);
                 covered.virgin = match yields {
                     Some(yields) => yields,
+                    None if !self.virgin => 0.0,
                     None if kept_by_law(curve) => pressure,
                     None => self.patches.yields(k, depth)?.0,
                 };

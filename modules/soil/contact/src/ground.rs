@@ -26,7 +26,7 @@ pub struct Covered {
     pub depth: f64,
     /// Pressure, Pa; 0: the foot does not touch here.
     pub pressure: f64,
-    /// Pressure at which the soil yields at this depth, Pa; 0 where the foot does not touch.
+    /// Pressure at which the soil yields at this depth, Pa; 0 where the foot does not touch, or where nobody asks.
     pub virgin: f64,
     /// Height of the unloaded surface, from the unrounded state, m; NaN where the foot does not touch.
     pub surface: f64,

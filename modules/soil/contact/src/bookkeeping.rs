@@ -223,7 +223,6 @@ impl Scene<'_> {
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
             let depth = n.depth[k] - dot(facing.press, moved);
-            let curve = &self.patches.law(k).curve;
             let mut kept = KeptContact::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
             let (pressure, yields) =
@@ -245,12 +244,7 @@ impl Scene<'_> {
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
                 covered.flow = flow_along(port, moved);
-                covered.virgin = match yields {
-                    Some(yields) => yields,
-                    None if !self.virgin => 0.0,
-                    None if kept_by_law(curve) => pressure,
-                    None => self.patches.yields(k, depth)?.0,
-                };
+                covered.virgin = self.virgin_at(k, depth, pressure, yields)?;
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
                 turnover.work -= dot(n.force(k, pressure, [0.0; 2]), moved);
@@ -354,6 +348,16 @@ impl Scene<'_> {
             _ if kept_by_law(&self.patches.law(k).curve) => Ok((self.kept(k, depth, out)?, None)),
             Some(pressure) => Ok((pressure, None)),
             None => self.patches.pressure_and_yield(k, depth).map(|((p, _), yields)| (p, yields)),
+        }
+    }
+
+    /// The pressure at which node k yields, if it is asked for; known where `yields`.
+    fn virgin_at(&self, k: usize, depth: f64, pressure: f64, yields: Option<f64>) -> Result<f64> {
+        match yields {
+            _ if !self.virgin => Ok(0.0),
+            Some(yields) => Ok(yields),
+            None if kept_by_law(&self.patches.law(k).curve) => Ok(pressure),
+            None => Ok(self.patches.yields(k, depth)?.0),
         }
     }
 

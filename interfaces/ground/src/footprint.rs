@@ -1,9 +1,10 @@
 //! The lattice nodes below a shape, each with the part of its cell that the shape covers.
 
 use crate::Surface;
+use crate::excerpt::Excerpt;
 use crate::joined::{Part, nodes_below_parts};
 use crate::outline::{Cell, Outline, reaches_beside};
-use crate::shape::Placed;
+use crate::shape::{Aabb, Placed};
 use terraglue_subsystem::Node;
 
 /// Heights that are read at once.
@@ -25,24 +26,45 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
         let part = Part { placed: shape, bounds: &bounds };
         return nodes_below_parts(std::iter::once(part), surface, margin, |_, node| out.push(node));
     }
-    let outline = Outline::of(shape);
-    let (i0, i1) = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
-    let (j0, j1) = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
-    let mut heights = [0.0; CHUNK];
-    for j in j0..=j1 {
-        for first in (i0..=i1).step_by(CHUNK) {
-            let row = &mut heights[..CHUNK.min((i1 - first + 1) as usize)];
-            surface.heights(first, j, row);
-            for (i, height) in (first..).zip(row) {
-                let reach = *height + margin;
-                if bounds.min[2] >= reach {
-                    continue;
-                }
-                let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
-                let beside = |point| reaches_beside(shape, surface, margin, [i, j], point);
-                if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach, beside) {
-                    let slope = shape.underside_slope([x, y, lower]);
-                    out.push(Node { i, j, area, lower, slope });
+    let i = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
+    let j = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
+    let below = Below { shape, bounds: &bounds, margin, i, j };
+    // at the rim each node is asked for its neighbours
+    match Excerpt::around(surface, i, j) {
+        Some(excerpt) => below.list(&excerpt, out),
+        None => below.list(surface, out),
+    }
+}
+
+/// What [`nodes_below`] looks for: the ranges of the nodes along x and y, ends included.
+struct Below<'a> {
+    shape: &'a Placed,
+    bounds: &'a Aabb,
+    margin: f64,
+    i: (i32, i32),
+    j: (i32, i32),
+}
+
+impl Below<'_> {
+    fn list<S: Surface + ?Sized>(&self, surface: &S, out: &mut Vec<Node>) {
+        let Self { shape, bounds, margin, i: (i0, i1), j: (j0, j1) } = *self;
+        let (lattice, outline) = (surface.lattice(), Outline::of(shape));
+        let mut heights = [0.0; CHUNK];
+        for j in j0..=j1 {
+            for first in (i0..=i1).step_by(CHUNK) {
+                let row = &mut heights[..CHUNK.min((i1 - first + 1) as usize)];
+                surface.heights(first, j, row);
+                for (i, height) in (first..).zip(row) {
+                    let reach = *height + margin;
+                    if bounds.min[2] >= reach {
+                        continue;
+                    }
+                    let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
+                    let beside = |point| reaches_beside(shape, surface, margin, [i, j], point);
+                    if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach, beside) {
+                        let slope = shape.underside_slope([x, y, lower]);
+                        out.push(Node { i, j, area, lower, slope });
+                    }
                 }
             }
         }

@@ -152,6 +152,12 @@ impl HeightField {
     pub fn units(&self, i: i32, j: i32) -> i32 {
         let (i, j) = self.lattice.clamp(i, j);
         let (tile, k) = self.lattice.locate(i, j);
+        self.units_at(tile, k)
+    }
+
+    /// Height of node k of a tile in units.
+    #[inline]
+    pub fn units_at(&self, tile: usize, k: usize) -> i32 {
         match self.tiles[tile].heights {
             Heights::Uniform(u) => u,
             Heights::Stored(slot) => self.pool.value(slot, k),
@@ -188,9 +194,17 @@ impl HeightField {
             return;
         }
         let (tile, k) = self.lattice.locate(i as u32, j as u32);
+        self.add_units_at(tile, k, change);
+    }
+
+    /// Adds `change` units to node k of a tile; its new height in units.
+    #[inline]
+    pub fn add_units_at(&mut self, tile: usize, k: usize, change: i32) -> i32 {
         let (heights, sinkage) = self.touch(tile);
-        self.pool.tile_mut(heights)[k] += change;
         self.pool.tile_mut(sinkage)[k] -= change;
+        let height = &mut self.pool.tile_mut(heights)[k];
+        *height += change;
+        *height
     }
 
     /// Puts node (i, j) at `units`.

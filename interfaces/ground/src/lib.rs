@@ -16,6 +16,7 @@
 struct Readme;
 
 mod coverage;
+mod excerpt;
 mod footprint;
 mod height_field;
 mod identity;

@@ -1,7 +1,9 @@
 //! Dense linear systems of moderate size (n ≲ 100), solved in place. Storage is reused from system to system, so a step allocates nothing;
 //! the factorisations of libraries take new memory for every matrix.
 
-/// LU factors with partial pivoting of a row-major n × n matrix; the storage is reused.
+use crate::in_place::{add_four, four, reduce};
+
+/// LU factors with partial pivoting of an n × n matrix, kept by columns; the storage is reused.
 ///
 /// ```
 /// use terraglue_numerics::dense::Lu;
@@ -33,39 +35,35 @@ impl Lu {
         self.n = n;
         self.factors.clear();
         self.pivots.clear();
-        for row in 0..n {
-            self.factors.extend((0..n).map(|column| entry(row, column)));
+        for column in 0..n {
+            self.factors.extend((0..n).map(|row| entry(row, column)));
         }
         let scale = self.factors.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let tiny = (1e-14 * scale).max(f64::MIN_POSITIVE);
         (0..n).filter(|k| self.eliminate(*k, tiny)).count()
     }
 
+    /// Makes column k one of the factors.
     fn eliminate(&mut self, k: usize, tiny: f64) -> bool {
-        let (n, a) = (self.n, &mut self.factors);
-        let mut pivot = k;
-        for row in k + 1..n {
-            if a[row * n + k].abs() > a[pivot * n + k].abs() {
-                pivot = row;
-            }
-        }
+        let n = self.n;
+        let (left, right) = self.factors.split_at_mut(k * n);
+        let column = &mut right[..n];
+        self.pivots.iter().enumerate().for_each(|(i, pivot)| column.swap(i, *pivot));
+        reduce(column, left);
+        let largest =
+            |best: usize, row: usize| if column[row].abs() > column[best].abs() { row } else { best };
+        let pivot = (k + 1..n).fold(k, largest);
         self.pivots.push(pivot);
-        for column in 0..if pivot == k { 0 } else { n } {
-            a.swap(k * n + column, pivot * n + column);
+        if pivot != k {
+            column.swap(k, pivot);
+            left.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
         }
-        let regular = a[k * n + k].abs() > tiny;
+        let regular = column[k].abs() > tiny;
         if !regular {
-            a[k * n + k] = tiny.copysign(a[k * n + k]);
+            column[k] = tiny.copysign(column[k]);
         }
-        let (upper, lower) = a.split_at_mut((k + 1) * n);
-        let pivot_row = &upper[k * n..];
-        for row in lower.chunks_exact_mut(n) {
-            let factor = row[k] / pivot_row[k];
-            row[k] = factor;
-            for (value, above) in row[k + 1..].iter_mut().zip(&pivot_row[k + 1..]) {
-                *value -= factor * above;
-            }
-        }
+        let diagonal = column[k];
+        column[k + 1..].iter_mut().for_each(|f| *f /= diagonal);
         regular
     }
 
@@ -82,25 +80,26 @@ impl Lu {
         for (k, pivot) in self.pivots.iter().enumerate() {
             b.swap(k, *pivot);
         }
-        for row in 1..n {
-            let (head, tail) = b.split_at_mut(row);
-            tail[0] -= dot(&self.factors[row * n..row * n + row], head);
+        for row in 0..n {
+            let sum: f64 = (0..row).map(|k| self.factors[k * n + row] * b[k]).sum();
+            b[row] -= sum;
         }
         for row in (0..n).rev() {
-            let (head, tail) = b.split_at_mut(row + 1);
-            let sum = dot(&self.factors[row * n + row + 1..(row + 1) * n], tail);
-            head[row] = (head[row] - sum) / self.factors[row * n + row];
+            let sum: f64 = (row + 1..n).map(|k| self.factors[k * n + row] * b[k]).sum();
+            b[row] = (b[row] - sum) / self.factors[row * n + row];
         }
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 /// y += A·x for a column-major n × n matrix.
 pub fn multiply_add(a: &[f64], x: &[f64], y: &mut [f64]) {
-    for (column, factor) in a.chunks_exact(y.len()).zip(x) {
+    let n = y.len().max(1);
+    let (fours, factors) = (a.chunks_exact(4 * n), x.chunks_exact(4));
+    let rest = fours.remainder().chunks_exact(n).zip(factors.remainder());
+    for (columns, x) in fours.zip(factors) {
+        add_four(y, four(columns, n), 0, [x[0], x[1], x[2], x[3]]);
+    }
+    for (column, factor) in rest {
         for (sum, entry) in y.iter_mut().zip(column) {
             *sum += entry * factor;
         }

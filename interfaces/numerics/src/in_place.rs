@@ -1,5 +1,52 @@
 //! Dense systems of a few unknowns in buffers of the caller; column-major.
 
+/// Four columns of n entries.
+#[inline(always)]
+pub(crate) fn four(columns: &[f64], n: usize) -> [&[f64]; 4] {
+    let (a, rest) = columns.split_at(n);
+    let (b, rest) = rest.split_at(n);
+    let (c, d) = rest.split_at(n);
+    [a, b, c, &d[..n]]
+}
+
+/// y += a·x for the entries of four columns a from `first` on, one after the other at each entry, as four single columns would
+/// be added.
+#[inline(always)]
+pub(crate) fn add_four(y: &mut [f64], [a, b, c, d]: [&[f64]; 4], first: usize, [p, q, r, s]: [f64; 4]) {
+    let n = y.len();
+    let (a, b, c, d) = (&a[first..][..n], &b[first..][..n], &c[first..][..n], &d[first..][..n]);
+    for k in 0..n {
+        y[k] = y[k] + p * a[k] + q * b[k] + r * c[k] + s * d[k];
+    }
+}
+
+/// Takes the columns `factors` (below the diagonal, which is 1), eliminated before, out of the next one; at the front of it stands its
+/// part of U. The same solves L·x = b.
+pub fn reduce(column: &mut [f64], factors: &[f64]) {
+    let n = column.len().max(1);
+    let fours = factors.chunks_exact(4 * n);
+    let (mut i, rest) = (0, fours.remainder());
+    for columns in fours {
+        let [a, b, c, d] = four(columns, n);
+        let (head, below) = column[i..].split_at_mut(4);
+        let p = -head[0];
+        head[1] += p * a[i + 1];
+        let q = -head[1];
+        head[2] = head[2] + p * a[i + 2] + q * b[i + 2];
+        let r = -head[2];
+        head[3] = head[3] + p * a[i + 3] + q * b[i + 3] + r * c[i + 3];
+        let s = -head[3];
+        i += 4;
+        add_four(below, [a, b, c, d], i, [p, q, r, s]);
+    }
+    for factors in rest.chunks_exact(n) {
+        let (head, below) = column.split_at_mut(i + 1);
+        let lead = -head[i];
+        below.iter_mut().zip(&factors[i + 1..]).for_each(|(y, f)| *y += lead * f);
+        i += 1;
+    }
+}
+
 /// Overwrites the lower triangle of the positive definite `a` (n × n) with L of A = L·Lᵀ. False: not definite.
 #[inline]
 pub fn cholesky(n: usize, a: &mut [f64]) -> bool {
@@ -14,7 +61,13 @@ pub fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
         let least = share * a[j * n + j];
         let (left, right) = a.split_at_mut(j * n);
         let column = &mut right[j..n];
-        for other in left.chunks_exact(n) {
+        let fours = left.chunks_exact(4 * n);
+        let rest = fours.remainder();
+        for columns in fours {
+            let [a, b, c, d] = four(columns, n);
+            add_four(column, [a, b, c, d], j, [-a[j], -b[j], -c[j], -d[j]]);
+        }
+        for other in rest.chunks_exact(n) {
             let (factor, other) = (other[j], &other[j..]);
             column.iter_mut().zip(other).for_each(|(v, o)| *v -= factor * o);
         }
@@ -31,10 +84,28 @@ pub fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
 /// x = A⁻¹·x with the factor of [`cholesky`].
 #[inline]
 pub fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
-    for (j, column) in l.chunks_exact(n.max(1)).take(n).enumerate() {
+    let fours = l[..n * n].chunks_exact(4 * n.max(1));
+    let rest = fours.remainder();
+    let mut j = 0;
+    for columns in fours {
+        let [a, b, c, d] = four(columns, n);
+        let (head, below) = x[j..n].split_at_mut(4);
+        head[0] /= a[j];
+        let p = -head[0];
+        head[1] = (head[1] + p * a[j + 1]) / b[j + 1];
+        let q = -head[1];
+        head[2] = (head[2] + p * a[j + 2] + q * b[j + 2]) / c[j + 2];
+        let r = -head[2];
+        head[3] = (head[3] + p * a[j + 3] + q * b[j + 3] + r * c[j + 3]) / d[j + 3];
+        let s = -head[3];
+        j += 4;
+        add_four(below, [a, b, c, d], j, [p, q, r, s]);
+    }
+    for column in rest.chunks_exact(n.max(1)) {
         let (head, below) = x.split_at_mut(j + 1);
         head[j] /= column[j];
         below.iter_mut().zip(&column[j + 1..]).for_each(|(v, l)| *v -= l * head[j]);
+        j += 1;
     }
     for (j, column) in l.chunks_exact(n.max(1)).take(n).enumerate().rev() {
         let below: f64 = column[j + 1..].iter().zip(&x[j + 1..n]).map(|(l, x)| l * x).sum();
@@ -48,20 +119,20 @@ pub fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
 pub fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
     order.clear();
     for j in 0..n {
-        let column = &a[j * n..(j + 1) * n];
+        let (left, right) = a.split_at_mut(j * n);
+        let column = &mut right[..n];
+        order.iter().enumerate().for_each(|(i, p)| column.swap(i, *p));
+        reduce(column, left);
         let p = (j + 1..n).fold(j, |best, i| if column[i].abs() > column[best].abs() { i } else { best });
         let pivot = column[p];
         if pivot == 0.0 || !pivot.is_finite() {
             return false;
         }
         order.push(p);
-        a.chunks_exact_mut(n).for_each(|column| column.swap(j, p));
-        let (left, right) = a.split_at_mut((j + 1) * n);
-        let factors = &mut left[j * n + j + 1..];
-        factors.iter_mut().for_each(|f| *f /= pivot);
-        for column in right.chunks_exact_mut(n) {
-            let (head, below) = column.split_at_mut(j + 1);
-            below.iter_mut().zip(&*factors).for_each(|(v, f)| *v -= f * head[j]);
+        column.swap(j, p);
+        column[j + 1..].iter_mut().for_each(|f| *f /= pivot);
+        if p != j {
+            left.chunks_exact_mut(n).for_each(|column| column.swap(j, p));
         }
     }
     true
@@ -71,10 +142,7 @@ pub fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
 #[inline]
 pub fn lu_solve(n: usize, a: &[f64], order: &[usize], x: &mut [f64]) {
     order.iter().enumerate().for_each(|(j, p)| x.swap(j, *p));
-    for (j, column) in a.chunks_exact(n).enumerate() {
-        let (head, below) = x.split_at_mut(j + 1);
-        below.iter_mut().zip(&column[j + 1..]).for_each(|(v, f)| *v -= f * head[j]);
-    }
+    reduce(x, a);
     for (j, column) in a.chunks_exact(n).enumerate().rev() {
         x[j] /= column[j];
         let (above, rest) = x.split_at_mut(j);

@@ -169,9 +169,12 @@ impl Robot {
         let g = self.ports.compliance(&self.dynamics);
         self.scratch.g.clear();
         self.scratch.g.extend_from_slice(g);
-        for c in 0..n {
-            for r in 0..n {
-                self.scratch.g[c * n + r] *= self.ports.side(r) * self.ports.side(c);
+        let first = if n > 0 { self.ports.side(0) } else { 1.0 };
+        if (1..n).any(|i| self.ports.side(i) != first) {
+            for c in 0..n {
+                for r in 0..n {
+                    self.scratch.g[c * n + r] *= self.ports.side(r) * self.ports.side(c);
+                }
             }
         }
         self.scratch.gap.clear();

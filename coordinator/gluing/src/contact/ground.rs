@@ -68,6 +68,7 @@ impl Ground {
             instance,
             edge: self.edge,
             last: Cell::new(None),
+            last_sunk: Cell::new(None),
             recent: Default::default(),
             sunk: Default::default(),
             trouble: Cell::new(None),
@@ -110,6 +111,7 @@ pub struct Reader<'a> {
     instance: &'a dyn Subsystem,
     edge: u32,
     last: Cell<Option<Recent<'a>>>,
+    last_sunk: Cell<Option<Recent<'a>>>,
     recent: Shelf<'a>,
     sunk: Shelf<'a>,
     trouble: Cell<Option<Trouble>>,
@@ -314,8 +316,16 @@ impl<'a> Undisturbed<'_, 'a> {
     fn sunk(&self, i: i32, j: i32) -> f64 {
         let (reader, edge) = (self.0, self.0.edge);
         let (i, j) = reader.lattice.clamp(i, j);
-        let tile = self.tile([i / edge, j / edge]);
-        tile.map_or(0.0, |tile| tile.values.at(((j % edge) * edge + i % edge) as usize))
+        if let Some(([i0, j0], tile)) = reader.last_sunk.get() {
+            let (a, b) = (i.wrapping_sub(i0), j.wrapping_sub(j0));
+            if a < edge && b < edge {
+                return tile.values.at((b * edge + a) as usize);
+            }
+        }
+        let Some(tile) = self.tile([i / edge, j / edge]) else { return 0.0 };
+        let first = [i - i % edge, j - j % edge];
+        reader.last_sunk.set(Some((first, tile)));
+        tile.values.at(((j - first[1]) * edge + i - first[0]) as usize)
     }
 
     /// Heights of a row as they are `now` and were before; no longer than [`ROW`].
@@ -346,7 +356,8 @@ impl Surface for Cut<'_, '_> {
 
     #[inline]
     fn height(&self, i: i32, j: i32) -> f64 {
-        self.0.height(i, j).max(self.0.undisturbed().height(i, j))
+        let now = self.0.height(i, j);
+        now.max(now + self.0.undisturbed().sunk(i, j))
     }
 
     fn heights(&self, i: i32, j: i32, out: &mut [f64]) {

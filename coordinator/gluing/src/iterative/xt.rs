@@ -10,6 +10,7 @@
 use super::super::Outcome;
 use super::super::interface_problem::InterfaceProblem;
 use super::{Limits, largest_eigenvalue};
+use std::ops::Range;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_numerics::dense::{Lu, make_room, max_norm, multiply_add};
@@ -148,9 +149,15 @@ impl XtForm {
         let (k, g) = (&self.k, &problem.estimate.g);
         self.kg.clear();
         self.kg.resize(n * n, 0.0);
-        for column in 0..n {
-            let out = &mut self.kg[column * n..][..n];
-            multiply_add(k, &g[column * n..][..n], out);
+        let apart = problem.ports.iter().all(|port| stands_alone(k, n, port.range()));
+        for (out, g) in self.kg.chunks_exact_mut(n.max(1)).zip(g.chunks_exact(n.max(1))) {
+            if !apart {
+                multiply_add(k, g, out);
+                continue;
+            }
+            for port in &problem.ports {
+                add_block(k, n, port.range(), g, out);
+            }
         }
         let kg = &self.kg;
         let rank = self.lu.factor(n, |r, c| kg[c * n + r] + if r == c { 1.0 } else { 0.0 });
@@ -195,5 +202,33 @@ impl XtForm {
         // motion was imposed on the soil: its surface is where the body is
         problem.second.x.copy_from_slice(&problem.first.x);
         Outcome::Converged
+    }
+}
+
+/// Whether the columns `range` of the n × n matrix k are zero outside the rows of that range: a port answers to itself alone.
+fn stands_alone(k: &[f64], n: usize, range: Range<usize>) -> bool {
+    k[range.start * n..range.end * n].chunks_exact(n.max(1)).all(|column| {
+        let none = |entries: &[f64]| entries.iter().all(|k| *k == 0.0);
+        none(&column[..range.start]) && none(&column[range.end..])
+    })
+}
+
+/// y += K·x for the components of one port.
+#[inline]
+fn add_block(k: &[f64], n: usize, range: Range<usize>, x: &[f64], y: &mut [f64]) {
+    let (first, y) = (range.start, &mut y[range.clone()]);
+    if let Ok(y) = <&mut [f64; 6]>::try_from(&mut *y) {
+        let mut sum = *y;
+        for c in range {
+            let Some(column) = k[c * n + first..].first_chunk::<6>() else { return };
+            for (s, k) in sum.iter_mut().zip(column) {
+                *s += k * x[c];
+            }
+        }
+        *y = sum;
+        return;
+    }
+    for c in range.clone() {
+        y.iter_mut().zip(&k[c * n + first..]).for_each(|(y, k)| *y += k * x[c]);
     }
 }

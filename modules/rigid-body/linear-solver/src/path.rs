@@ -28,10 +28,35 @@ impl Path {
         tree.loops().feel(tree.forest(), body, path, loops);
     }
 
+    /// All [`Path::dot`] of six vectors of a with six of b, each six side by side, entry after entry: row by vector of a.
+    pub fn dots(tree: &Tree, shared: usize, a: &[f64], b: &[f64]) -> [[f64; 6]; 6] {
+        let loops = tree.loops().len();
+        let (a, b) = (a.as_chunks().0, b.as_chunks().0);
+        let mut sums = products(&a[loops..shared], &b[loops..shared]);
+        let held = products(&a[..loops], &b[..loops]);
+        for (sum, held) in sums.as_flattened_mut().iter_mut().zip(held.as_flattened()) {
+            *sum -= held;
+        }
+        sums
+    }
+
     /// ⟨y_a, y_b⟩ over the shared entries: the part that loops hold back is subtracted.
     pub fn dot(tree: &Tree, shared: usize, a: &[f64], b: &[f64]) -> f64 {
         let loops = tree.loops().len();
         let held: f64 = a[..loops].iter().zip(&b[..loops]).map(|(a, b)| a * b).sum();
         a[loops..shared].iter().zip(&b[loops..shared]).map(|(a, b)| a * b).sum::<f64>() - held
     }
+}
+
+/// Sums of the products of six with six numbers of each entry.
+fn products(a: &[[f64; 6]], b: &[[f64; 6]]) -> [[f64; 6]; 6] {
+    let mut sums = [[-0.0; 6]; 6];
+    for (a, b) in a.iter().zip(b) {
+        for (row, a) in sums.iter_mut().zip(a) {
+            for (sum, b) in row.iter_mut().zip(b) {
+                *sum += a * b;
+            }
+        }
+    }
+    sums
 }

@@ -16,6 +16,7 @@
 //! give another answer, and the one with the smaller defect counts.
 
 use crate::lcp::{Lemke, Outcome};
+use terraglue_numerics::dense::multiply_add;
 use terraglue_numerics::in_place::{cholesky, cholesky_above, cholesky_solve, lu, lu_solve, rank};
 use terraglue_subsystem::Port;
 
@@ -30,6 +31,9 @@ const IMMOBILE_REGULARISATION: f64 = 1e-9;
 const PROXIMAL_MIN: usize = 4;
 const PROXIMAL_MAX: usize = 40;
 const PROXIMAL_CHANGE: f64 = 1e-12;
+/// Increments of proximal steps that are the one before times a factor above this, to this share of them, go on like that.
+const SLOW: f64 = 0.9;
+const STEADY: f64 = 3e-3;
 /// Still so large a share of T in the last proximal step: the components cannot be held, and T grows with every step.
 const GROWS: f64 = 1e-2;
 /// Relative change at which components that slip with their normal force have converged.
@@ -78,6 +82,8 @@ pub(crate) struct Estimator {
     unknowns: Vec<usize>,
     matrix: Vec<f64>,
     rhs: Vec<f64>,
+    /// The increment of the proximal step before.
+    last: Vec<f64>,
     normals: Vec<usize>,
     normal_gap: Vec<f64>,
     normal_rhs: Vec<f64>,
@@ -155,7 +161,8 @@ impl Estimator {
         for numbers in [&mut self.unknowns, &mut self.normals, &mut self.order, &mut self.pressing] {
             room(numbers, n);
         }
-        let all = [&mut self.rhs, &mut self.normal_gap, &mut self.normal_rhs, &mut self.solution];
+        let all =
+            [&mut self.rhs, &mut self.last, &mut self.normal_gap, &mut self.normal_rhs, &mut self.solution];
         all.into_iter().chain([&mut self.open, &mut self.before, &mut self.rounds]).for_each(|v| room(v, n));
         room(&mut self.matrix, n * n);
         room(&mut self.slipping, n);
@@ -356,6 +363,7 @@ impl Estimator {
         for step in 0..PROXIMAL_MAX {
             // In increments: (G + ε)·dT = −(x_free + G·T − x2), exact to rounding at any size of T.
             residuals(p, t, &mut self.open);
+            std::mem::swap(&mut self.rhs, &mut self.last);
             self.rhs.clear();
             self.rhs.extend(self.unknowns.iter().map(|i| -self.open[*i]));
             if self.slipping.is_empty() {
@@ -363,19 +371,47 @@ impl Estimator {
             } else {
                 lu_solve(m, &self.matrix, &self.order, &mut self.rhs);
             }
-            self.unknowns.iter().zip(&self.rhs).for_each(|(i, d)| t[*i] += d);
-            self.slipping.iter().for_each(|(i, normal, ratio)| t[*i] = ratio * t[self.unknowns[*normal]]);
+            self.advance(t, 1.0);
             change = largest(self.rhs.iter().copied());
-            size = largest(t.iter().copied());
             // components that rigid motors alone hold grow until the motors' bounds decide in the next round
             let mobile = |(k, _): &(usize, &f64)| self.epsilon[self.unknowns[*k]] != IMMOBILE_REGULARISATION;
-            let growth = largest(self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
+            let mut growth = largest(self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
+            let steady = if step >= least && !regular { self.steady(step) } else { None };
+            if let Some((sum, last)) = steady {
+                self.advance(t, sum);
+                (change, growth) = (last * change, last * growth);
+            }
+            size = largest(t.iter().copied());
             converged = growth <= GROWS * size;
-            if step >= least && change <= PROXIMAL_CHANGE * size {
+            if steady.is_some() || (step >= least && change <= PROXIMAL_CHANGE * size) {
                 break;
             }
         }
         (converged, change <= ARRIVED * size && size.is_finite())
+    }
+
+    /// Takes a share of the increment in hand.
+    fn advance(&self, t: &mut [f64], share: f64) {
+        self.unknowns.iter().zip(&self.rhs).for_each(|(i, d)| t[*i] += share * d);
+        self.slipping.iter().for_each(|(i, normal, ratio)| t[*i] = ratio * t[self.unknowns[*normal]]);
+    }
+
+    /// Where each increment is the one before times a factor near one, as where nothing holds some components and T grows
+    /// with every step: the sum of all increments to come after `step`, and the last of them, over the one in hand.
+    fn steady(&self, step: usize) -> Option<(f64, f64)> {
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (square, before) = (product(&self.rhs, &self.rhs), product(&self.last, &self.last));
+        let factor = product(&self.rhs, &self.last) / before;
+        let off = square - factor * factor * before;
+        if !(factor > SLOW && factor <= 1.0 && off <= STEADY * STEADY * square) {
+            return None;
+        }
+        let (mut sum, mut last) = (0.0, 1.0);
+        for _ in step + 1..PROXIMAL_MAX {
+            last *= factor;
+            sum += last;
+        }
+        Some((sum, last))
     }
 
     /// Opens, closes, clips; true when something changed noticeably.
@@ -535,12 +571,8 @@ fn residual(p: &Problem, t: &[f64], i: usize) -> f64 {
 /// [`residual`] of all components, column by column.
 fn residuals(p: &Problem, t: &[f64], out: &mut Vec<f64>) {
     out.clear();
-    out.resize(p.gap.len(), -0.0);
-    for (column, t) in p.g.chunks_exact(p.gap.len().max(1)).zip(t) {
-        if *t != 0.0 {
-            out.iter_mut().zip(column).for_each(|(o, g)| *o += g * t);
-        }
-    }
+    out.resize(p.gap.len(), 0.0);
+    multiply_add(p.g, t, out);
     out.iter_mut().zip(p.gap).for_each(|(o, gap)| *o += gap);
 }
 

@@ -4,7 +4,7 @@ use crate::dynamics::Dynamics;
 use crate::dynamics::carried::Carried;
 use crate::math::{V3, cayley, cayley_shift, cayley_vector};
 use crate::motion::Motion;
-use terraglue_linear_solver::Path;
+use terraglue_linear_solver::{Path, Tree};
 use terraglue_subsystem::{Port, PortKind, Response};
 
 /// One packed component: a generalised direction on one body.
@@ -32,9 +32,13 @@ impl Component {
 #[derive(Default)]
 pub(crate) struct Ports {
     components: Vec<Component>,
-    /// Answer of the factor to each component, along its path to the root; `stride` entries each.
+    /// Components side by side on one body, at most six: the body, the first of them, how many.
+    groups: Vec<(usize, usize, usize)>,
+    /// Answers of the factor to the components of each group, along their path to the root: six numbers an entry, `stride`
+    /// entries a group.
     answers: Vec<f64>,
     stride: usize,
+    answer: Vec<f64>,
     g: Vec<f64>,
     scratch: Vec<f64>,
     /// Number of the factorisation that `g` belongs to; 0: none.
@@ -115,6 +119,31 @@ impl Ports {
         }
     }
 
+    /// Answers of the factor to all components.
+    fn respond(&mut self, tree: &Tree) {
+        self.groups.clear();
+        for (i, component) in self.components.iter().enumerate() {
+            match self.groups.last_mut() {
+                Some((body, _, count)) if *body == component.body && *count < 6 => *count += 1,
+                _ => self.groups.push((component.body, i, 1)),
+            }
+        }
+        self.stride = self.groups.iter().map(|(body, ..)| Path::len(tree, *body)).max().unwrap_or(0);
+        self.answers.clear();
+        self.answers.resize(6 * self.groups.len() * self.stride, 0.0);
+        self.answer.resize(self.stride, 0.0);
+        for ((body, first, count), all) in
+            self.groups.iter().zip(self.answers.chunks_exact_mut(6 * self.stride.max(1)))
+        {
+            for (lane, component) in self.components[*first..first + count].iter().enumerate() {
+                Path::respond(tree, *body, &component.row, &mut self.answer);
+                for (entry, y) in all.chunks_exact_mut(6).zip(&self.answer[..Path::len(tree, *body)]) {
+                    entry[lane] = *y;
+                }
+            }
+        }
+    }
+
     /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major; in a step of no length dA/d(wrench).
     ///
     /// Only along the paths of the bodies to the root: see [`Path`].
@@ -127,26 +156,21 @@ impl Ports {
             return &self.g;
         }
         let tree = &dynamics.kkt.solver;
-        self.stride = self.components.iter().map(|c| Path::len(tree, c.body)).max().unwrap_or(0);
-        self.answers.clear();
-        self.answers.resize(n * self.stride, 0.0);
-        for (component, y) in self.components.iter().zip(self.answers.chunks_exact_mut(self.stride.max(1))) {
-            Path::respond(tree, component.body, &component.row, y);
-        }
+        self.respond(tree);
         self.g.clear();
         self.g.resize(n * n, 0.0);
         let h2 = if dynamics.h > 0.0 { dynamics.h * dynamics.impulse_per_force() } else { 1.0 };
-        let (mut pair, mut shared) = ([usize::MAX; 2], 0);
-        for i in 0..n {
-            for k in 0..=i {
-                let bodies = [self.components[i].body, self.components[k].body];
-                if bodies != pair {
-                    (pair, shared) = (bodies, Path::shared(tree, bodies[0], bodies[1]));
+        for (i, (body, first, count)) in self.groups.iter().enumerate() {
+            for (k, (other, start, others)) in self.groups[..=i].iter().enumerate() {
+                let shared = Path::shared(tree, *body, *other);
+                let answers = |group: usize| &self.answers[6 * group * self.stride..];
+                let sums = Path::dots(tree, shared, answers(i), answers(k));
+                for (r, row) in (*first..).zip(&sums[..*count]) {
+                    for (c, sum) in (*start..).zip(&row[..*others]) {
+                        self.g[c * n + r] = h2 * sum;
+                        self.g[r * n + c] = h2 * sum;
+                    }
                 }
-                let answer = |c: usize| &self.answers[c * self.stride..];
-                let sum = Path::dot(tree, shared, answer(i), answer(k));
-                self.g[k * n + i] = h2 * sum;
-                self.g[i * n + k] = h2 * sum;
             }
         }
         self.g_of = dynamics.kkt.factor_count;

@@ -65,7 +65,20 @@ impl Marks {
     /// Adds a node of the lattice.
     #[inline]
     pub fn mark(&mut self, [i, j]: [i32; 2]) {
-        self.set(i / EDGE, j, 1 << (i % EDGE));
+        let (tile, k) = self.lattice.locate(i as u32, j as u32);
+        self.mark_at(tile, k);
+    }
+
+    /// Adds node k of a tile.
+    #[inline]
+    pub fn mark_at(&mut self, tile: usize, k: usize) {
+        let (row, column) = (k / TILE_EDGE as usize, k % TILE_EDGE as usize);
+        let bits = &mut self.bits[tile];
+        if bits.any == 0 {
+            self.tiles.push(tile as u32);
+        }
+        bits.any |= 1 << row;
+        bits.rows[row] |= 1 << column;
     }
 
     /// Adds the nodes i0 … i1 − 1 of row j.

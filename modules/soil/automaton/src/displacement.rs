@@ -18,8 +18,11 @@ const DIRECTIONS: [([i32; 2], i32); 8] = [
     ([1, -1], 2),
 ];
 
+/// A node by its tile and its number in it.
+type Node = (usize, usize);
+
 /// A node without a foot, and its weight among the eight.
-type Place = ([i32; 2], f64);
+type Place = (Node, f64);
 
 /// Data that displacement changes.
 pub struct Site<'a> {
@@ -91,10 +94,10 @@ impl Site<'_> {
     /// the most.
     fn liftable(&self, [i, j]: [i32; 2], places: &[Option<Place>; 8], sum: f64) -> i32 {
         let heights = &self.ground.heights;
-        let (mut higher, mut spread) = (0.0, 1.0);
-        for ([a, b], weight) in places.iter().flatten().filter(|_| sum > 0.0) {
+        let (own, mut higher, mut spread) = (heights.units(i, j), 0.0, 1.0);
+        for ((tile, k), weight) in places.iter().flatten().filter(|_| sum > 0.0) {
             let share = weight / sum;
-            higher += share * f64::from(heights.units(*a, *b) - heights.units(i, j));
+            higher += share * f64::from(heights.units_at(*tile, *k) - own);
             spread += share * share;
         }
         // compacted material is not lifted: spread·n² + 2·higher·n = most of the rest
@@ -102,46 +105,49 @@ impl Site<'_> {
         (((higher * higher + spread * most).sqrt() - higher) / spread) as i32
     }
 
-    fn free(&self, at: [i32; 2]) -> bool {
-        !self.feet.above(at[0], at[1])
+    /// A node of the lattice, if no foot covers it.
+    fn free(&self, [i, j]: [i32; 2]) -> Option<Node> {
+        let (tile, k) = self.ground.heights.lattice().locate(i as u32, j as u32);
+        (!self.feet.above_at(tile, k)).then_some((tile, k))
     }
 
     /// The first node along a direction that no foot covers, and its distance in steps.
-    fn nearest_free(&self, from: [i32; 2], direction: [i32; 2]) -> Option<([i32; 2], i32)> {
+    fn nearest_free(&self, from: [i32; 2], direction: [i32; 2]) -> Option<(Node, i32)> {
         let lattice = self.ground.heights.lattice();
         for steps in 1.. {
             let at = [from[0] + steps * direction[0], from[1] + steps * direction[1]];
             if !lattice.has(at[0], at[1]) {
                 return None;
             }
-            if self.free(at) {
-                return Some((at, steps));
+            if let Some(node) = self.free(at) {
+                return Some((node, steps));
             }
         }
         None
     }
 
     /// A nearest free node by rings of growing size: for a foot in a corner that no direction leads out of.
-    fn nearest_anywhere(&self, [i, j]: [i32; 2]) -> Option<[i32; 2]> {
+    fn nearest_anywhere(&self, [i, j]: [i32; 2]) -> Option<Node> {
         let lattice = self.ground.heights.lattice();
         let farthest = lattice.size[0].max(lattice.size[1]) as i32;
         for r in 1..=farthest {
             for d in -r..=r {
                 let ring = [[i + d, j - r], [i + d, j + r], [i - r, j + d], [i + r, j + d]];
-                if let Some(at) = ring.into_iter().find(|at| lattice.has(at[0], at[1]) && self.free(*at)) {
-                    return Some(at);
+                let mut inside = ring.into_iter().filter(|at| lattice.has(at[0], at[1]));
+                if let Some(node) = inside.find_map(|at| self.free(at)) {
+                    return Some(node);
                 }
             }
         }
         None
     }
 
-    fn give(&mut self, [i, j]: [i32; 2], units: i32) -> i32 {
+    fn give(&mut self, (tile, k): Node, units: i32) -> i32 {
         if units > 0 {
-            self.ground.add_material(i, j, units);
-            self.lifted += squares_grown(self.ground.heights.units(i, j), units);
-            self.changed.mark([i, j]);
-            self.moving.mark([i, j]);
+            let height = self.ground.add_material_at(tile, k, units);
+            self.lifted += squares_grown(height, units);
+            self.changed.mark_at(tile, k);
+            self.moving.mark_at(tile, k);
         }
         units.max(0)
     }

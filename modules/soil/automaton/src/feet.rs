@@ -138,6 +138,12 @@ impl Feet {
     #[inline]
     pub fn above(&self, i: i32, j: i32) -> bool {
         let (tile, k) = self.lattice.locate(i as u32, j as u32);
+        self.above_at(tile, k)
+    }
+
+    /// The same of node k of a tile.
+    #[inline]
+    pub fn above_at(&self, tile: usize, k: usize) -> bool {
         self.covered[tile][k / TILE_EDGE as usize] >> (k % TILE_EDGE as usize) & 1 == 1
     }
 

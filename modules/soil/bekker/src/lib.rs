@@ -56,6 +56,7 @@ pub struct Compaction;
 
 impl Material for Compaction {
     type Saved = ();
+    const READS_VIRGIN: bool = false;
 
     fn redistribute(&mut self, ground: &mut Ground, covered: &[Covered], _: f64, _: f64) -> f64 {
         for node in covered.iter().filter(|node| node.pressure > 0.0) {

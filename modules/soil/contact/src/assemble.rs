@@ -104,7 +104,7 @@ impl Patches {
     pub fn at_rest(&self, p: usize) -> Result<([f64; 6], f64)> {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
         let n = &self.nodes;
-        let mut bound = Bound::new(n.doubles);
+        let mut bound = None;
         self.try_each_answer(p, &[0.0; 6], |k, pressure, _, r| {
             // changes of the bearing capacity by shear and motion of the last step belong to the step that begins
             let committed = n.stamp[k] != 0 && n.before[k] > 0.0 && pressure > 0.0;
@@ -115,6 +115,7 @@ impl Patches {
             // soil that clings under tension holds nothing along the underside
             let (pressed, slip) = (pressure.max(0.0), n.shear[k].slip);
             if shear.is_batched() {
+                let bound = bound.get_or_insert_with(|| Bound::new(n.doubles));
                 strength += bound.add(&self.laws, n.law[k], inclined, [pressed, slip], n.kept(k))?;
             } else {
                 strength += inclined * shear.yield_stress(pressed, slip, n.mobilised[k], n.kept(k))?;
@@ -125,7 +126,8 @@ impl Patches {
         // of the sides of a closed outline at most half look one way
         let sides = &self.sides[self.ports[p].wall.sides.clone()];
         strength += 0.5 * sides.iter().map(|side| side.force).sum::<f64>();
-        Ok((sum, strength + bound.take(&self.laws)?))
+        let waiting = bound.as_mut().map_or(Ok(0.0), |bound| bound.take(&self.laws))?;
+        Ok((sum, strength + waiting))
     }
 
     /// Force of patch `p` on the body along n at `x`, N, and by how much it falls with X_n, N/m.
@@ -315,19 +317,20 @@ fn add_stiffness(sum: &mut Stiffness, arm: [f64; 3], node: &[[f64; 3]; 3], momen
         }
         return;
     }
+    // B is the identity beside the matrix of θ × arm: only its terms that are not zero
     let [r_n, r_1, r_2] = arm;
-    let b =
-        [[1.0, 0.0, 0.0, 0.0, r_2, -r_1], [0.0, 1.0, 0.0, -r_2, 0.0, r_n], [0.0, 0.0, 1.0, r_1, -r_n, 0.0]];
     let mut kb = [[0.0; 6]; 3];
-    for (row, values) in kb.iter_mut().zip(node) {
-        for (value, b) in values.iter().zip(&b) {
-            row.iter_mut().zip(b).for_each(|(r, b)| *r += value * b);
-        }
+    for (row, [k_n, k_1, k_2]) in kb.iter_mut().zip(node) {
+        *row = [*k_n, *k_1, *k_2, k_2 * r_1 - k_1 * r_2, k_n * r_2 - k_2 * r_n, k_1 * r_n - k_n * r_1];
     }
-    for (b, kb) in b.iter().zip(&kb) {
-        for (row, b) in sum.iter_mut().zip(b) {
-            row.iter_mut().zip(kb).for_each(|(r, k)| *r += b * k);
-        }
+    for c in 0..6 {
+        let [n, a, b] = [kb[0][c], kb[1][c], kb[2][c]];
+        sum[0][c] += n;
+        sum[1][c] += a;
+        sum[2][c] += b;
+        sum[3][c] = sum[3][c] - r_2 * a + r_1 * b;
+        sum[4][c] = sum[4][c] + r_2 * n - r_n * b;
+        sum[5][c] = sum[5][c] - r_1 * n + r_n * a;
     }
 }
 

@@ -112,6 +112,8 @@ pub struct Scene<'a> {
     pub patches: &'a Patches,
     /// Length of the step, s.
     pub h: f64,
+    /// Whether [`Covered::virgin`] is asked for.
+    pub virgin: bool,
 }
 
 /// A node that the foot presses: its number in the arrays, depth and displacement.
@@ -221,10 +223,10 @@ impl Scene<'_> {
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
             let depth = n.depth[k] - dot(facing.press, moved);
-            let curve = &self.patches.law(k).curve;
             let mut kept = KeptContact::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
-            let pressure = self.pressure(k, depth, asked.map(|(pressure, _)| pressure), &mut kept)?;
+            let (pressure, yields) =
+                self.pressure(k, depth, asked.map(|(pressure, _)| pressure), &mut kept)?;
             let [i, j] = n.index[k];
             let (mut covered, deep) = covered(n, k, [depth, pressure], patch.slope);
             if pressure > 0.0 {
@@ -242,7 +244,7 @@ impl Scene<'_> {
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
                 covered.flow = flow_along(port, moved);
-                covered.virgin = if kept_by_law(curve) { pressure } else { self.patches.yields(k, depth)?.0 };
+                covered.virgin = self.virgin_at(k, depth, pressure, yields)?;
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
                 turnover.work -= dot(n.force(k, pressure, [0.0; 2]), moved);
@@ -333,12 +335,29 @@ impl Scene<'_> {
         ledger.elastic += held;
     }
 
-    /// The pressure at node k, evaluated unless `asked`, and the state that a law keeps.
-    fn pressure(&self, k: usize, depth: f64, asked: Option<f64>, out: &mut KeptContact) -> Result<f64> {
+    /// The pressure at node k, evaluated unless `asked`, that at which it yields where that was needed, and the state that a
+    /// law keeps.
+    fn pressure(
+        &self,
+        k: usize,
+        depth: f64,
+        asked: Option<f64>,
+        out: &mut KeptContact,
+    ) -> Result<(f64, Option<f64>)> {
         match asked {
-            _ if kept_by_law(&self.patches.law(k).curve) => self.kept(k, depth, out),
-            Some(pressure) => Ok(pressure),
-            None => Ok(self.patches.pressure(k, depth)?.0),
+            _ if kept_by_law(&self.patches.law(k).curve) => Ok((self.kept(k, depth, out)?, None)),
+            Some(pressure) => Ok((pressure, None)),
+            None => self.patches.pressure_and_yield(k, depth).map(|((p, _), yields)| (p, yields)),
+        }
+    }
+
+    /// The pressure at which node k yields, if it is asked for; known where `yields`.
+    fn virgin_at(&self, k: usize, depth: f64, pressure: f64, yields: Option<f64>) -> Result<f64> {
+        match yields {
+            _ if !self.virgin => Ok(0.0),
+            Some(yields) => Ok(yields),
+            None if kept_by_law(&self.patches.law(k).curve) => Ok(pressure),
+            None => Ok(self.patches.yields(k, depth)?.0),
         }
     }
 

@@ -169,14 +169,16 @@ impl PatchNodes {
         let (bends, twist) = ([left * bend(0, 0), left * bend(1, 1)], 0.5 * left * (bend(0, 1) + bend(1, 0)));
         let cell = spacing * spacing;
         let [a, b, c] = [BENT * bends[0], BENT * bends[1], TWISTED * twist];
-        let mut fold = Fold::new(own, spacing, ground);
-        if deepest > 0.0 {
+        let mut folded = if deepest > 0.0 {
+            let mut fold = Fold::new(own, spacing, ground);
             let edges = beside.iter().flatten().filter_map(|side| side.edge.as_ref());
             edges.for_each(|edge| fold.add(edge.plane));
             let across = ACROSS.into_iter().filter_map(|steps| seen(steps)?.edge);
             across.for_each(|edge| fold.add(edge.plane));
-        }
-        let mut folded = fold.underside(level);
+            fold.underside(level)
+        } else {
+            Underside::of(&own, spacing, ground)
+        };
         folded.rise += cell / 24.0 * (bends[0] + bends[1]);
         folded.variance += cell * cell / 3.0 * (a * a + b * b + c * c);
         folded

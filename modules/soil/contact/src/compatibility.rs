@@ -8,6 +8,8 @@
 use crate::assemble::Noted;
 use crate::patch::Patches;
 use crate::vectors::Stiffness;
+use terraglue_numerics::dense::multiply_add;
+use terraglue_numerics::in_place::reduce;
 use terraglue_subsystem::{Estimate, Result};
 
 /// Newton steps at most.
@@ -31,6 +33,8 @@ pub struct Compatibility {
     noted: Noted,
     /// [I + K·G | −r], column-major n × (n + 1).
     matrix: Vec<f64>,
+    /// Rows of it that have changed places.
+    pivots: Vec<(usize, usize)>,
 }
 
 impl Compatibility {
@@ -76,9 +80,7 @@ impl Compatibility {
     /// X and r at the present T; |r|.
     fn evaluate(&mut self, patches: &Patches, estimate: &Estimate) -> Result<f64> {
         self.x.copy_from_slice(estimate.x_free);
-        for (column, t) in estimate.g.chunks_exact(self.t.len().max(1)).zip(&self.t) {
-            self.x.iter_mut().zip(column).for_each(|(x, g)| *x += g * t);
-        }
+        multiply_add(estimate.g, &self.t, &mut self.x);
         self.noted.clear();
         for (p, patch) in patches.ports.iter().enumerate() {
             let wrench = patches.noted_wrench(p, &patch.unpack(&self.x), &mut self.noted)?;
@@ -96,10 +98,13 @@ impl Compatibility {
         (0..n).for_each(|c| self.matrix[c * n + c] = 1.0);
         for (p, patch) in patches.ports.iter().enumerate() {
             let block = patches.noted_stiffness(p, &patch.unpack(&self.x), &self.noted);
-            add_product(&patch.place, &block, g, &mut self.matrix, n);
+            // a foot in the air has none
+            if block.as_flattened().iter().any(|k| *k != 0.0) {
+                add_product(&patch.place, &block, g, &mut self.matrix, n);
+            }
         }
         self.matrix[n * n..].iter_mut().zip(&self.residual).for_each(|(m, r)| *m = -r);
-        if !eliminate(&mut self.matrix, n) || !substitute(&mut self.matrix, n) {
+        if !eliminate(&mut self.matrix, n, &mut self.pivots) || !substitute(&mut self.matrix, n) {
             return false;
         }
         self.d.copy_from_slice(&self.matrix[n * n..]);
@@ -126,6 +131,11 @@ impl Compatibility {
 
 /// Adds the rows of K·G that belong to one port: `block` of K at the components `place`.
 fn add_product(place: &[Option<usize>; 6], block: &Stiffness, g: &[f64], matrix: &mut [f64], n: usize) {
+    if let [Some(first), .., Some(last)] = *place
+        && last == first + 5
+    {
+        return add_whole(first, block, g, matrix, n);
+    }
     for (out, g) in matrix.chunks_exact_mut(n).zip(g.chunks_exact(n)) {
         for (row, r) in block.iter().zip(place) {
             let Some(r) = r else { continue };
@@ -138,26 +148,60 @@ fn add_product(place: &[Option<usize>; 6], block: &Stiffness, g: &[f64], matrix:
     }
 }
 
+/// The same for a port that carries all six components, from `first` on: its rows side by side.
+fn add_whole(first: usize, block: &Stiffness, g: &[f64], matrix: &mut [f64], n: usize) {
+    let mut columns = [[0.0; 6]; 6];
+    for (c, column) in columns.iter_mut().enumerate() {
+        for (k, row) in column.iter_mut().zip(block) {
+            *k = row[c];
+        }
+    }
+    for (out, g) in matrix.chunks_exact_mut(n).zip(g.chunks_exact(n)) {
+        let (Some(out), Some(g)) = (six_mut(out, first), six(g, first)) else { return };
+        let mut sum = *out;
+        for (column, g) in columns.iter().zip(g) {
+            for (s, k) in sum.iter_mut().zip(column) {
+                *s += k * g;
+            }
+        }
+        *out = sum;
+    }
+}
+
+#[inline]
+fn six(all: &[f64], first: usize) -> Option<&[f64; 6]> {
+    all.get(first..)?.first_chunk()
+}
+
+#[inline]
+fn six_mut(all: &mut [f64], first: usize) -> Option<&mut [f64; 6]> {
+    all.get_mut(first..)?.first_chunk_mut()
+}
+
 /// Gauss's elimination of [A | b] (column-major n × (n + 1)) with the largest pivot of each column; whether there is one.
-fn eliminate(matrix: &mut [f64], n: usize) -> bool {
-    for i in 0..n {
-        let (left, right) = matrix.split_at_mut((i + 1) * n);
-        let column = &mut left[i * n..];
-        let pivot = (i + 1..n).fold(i, |best, r| if column[r].abs() > column[best].abs() { r } else { best });
+/// `pivots`: rows that change places.
+fn eliminate(matrix: &mut [f64], n: usize, pivots: &mut Vec<(usize, usize)>) -> bool {
+    pivots.clear();
+    for c in 0..=n {
+        let (factors, column) = matrix.split_at_mut(c * n);
+        let column = &mut column[..n];
+        pivots.iter().for_each(|(i, p)| column.swap(*i, *p));
+        reduce(column, factors);
+        if c == n {
+            break;
+        }
+        let pivot = (c + 1..n).fold(c, |best, r| if column[r].abs() > column[best].abs() { r } else { best });
         let diagonal = column[pivot];
         if diagonal == 0.0 || !diagonal.is_finite() {
             return false;
         }
-        column.swap(i, pivot);
-        let inverse = 1.0 / diagonal;
-        let factors = &mut column[i + 1..];
-        factors.iter_mut().for_each(|f| *f *= inverse);
-        for other in right.chunks_exact_mut(n) {
-            other.swap(i, pivot);
-            let (head, below) = other.split_at_mut(i + 1);
-            let lead = -head[i];
-            below.iter_mut().zip(&*factors).for_each(|(y, f)| *y += lead * f);
+        if pivot != c {
+            pivots.push((c, pivot));
+            column.swap(c, pivot);
+            factors.chunks_exact_mut(n).for_each(|factors| factors.swap(c, pivot));
         }
+        let inverse = 1.0 / diagonal;
+        column[c + 1..].iter_mut().for_each(|f| *f *= inverse);
     }
     true
 }

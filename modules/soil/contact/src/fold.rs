@@ -26,6 +26,15 @@ pub struct Underside {
     pub steeper: f64,
 }
 
+impl Underside {
+    /// Of one plane alone.
+    pub fn of(plane: &Plane, spacing: f64, ground: [f64; 2]) -> Self {
+        let tilt = [0, 1].map(|c| plane.slope[c] - ground[c]);
+        let variance = spacing * spacing / 12.0 * (tilt[0] * tilt[0] + tilt[1] * tilt[1]);
+        Self { rise: 0.0, variance, slope: plane.slope, steeper: 1.0 }
+    }
+}
+
 /// The planes that meet in a cell. The envelope faces as its part in the soil does: the faces of a wedge in the soil press it, not those
 /// above.
 pub struct Fold {
@@ -53,13 +62,10 @@ impl Fold {
 
     /// The underside where the soil lies `level` (m) above the node.
     pub fn underside(&self, level: f64) -> Underside {
-        let own = self.planes[0];
-        if self.count > 1 {
-            return self.envelope(level);
+        match self.count {
+            1 => Underside::of(&self.planes[0], self.spacing, self.ground),
+            _ => self.envelope(level),
         }
-        let tilt = [0, 1].map(|c| own.slope[c] - self.ground[c]);
-        let variance = self.spacing * self.spacing / 12.0 * (tilt[0] * tilt[0] + tilt[1] * tilt[1]);
-        Underside { rise: 0.0, variance, slope: own.slope, steeper: 1.0 }
     }
 
     fn envelope(&self, level: f64) -> Underside {
@@ -105,23 +111,31 @@ impl Fold {
     /// push a level sole aside, whatever its sides look like.
     fn mean_slope(&self, axis: usize, place: &[f64; SAMPLES], level: f64) -> f64 {
         let half = 0.5 * self.spacing;
-        let (mut rises, mut length) = (0.0, 0.0);
-        for across in place {
-            let (mut low, mut high, mut ends) = (-half, half, [f64::NEG_INFINITY; 2]);
-            for plane in &self.planes[..self.count] {
-                let tilt = [0, 1].map(|c| plane.slope[c] - self.ground[c]);
-                let (along, at) =
-                    (tilt[axis], plane.height - self.planes[0].height + tilt[1 - axis] * across);
-                ends = [ends[0].max(at - along * half), ends[1].max(at + along * half)];
-                let below = level - at;
-                if along > 0.0 {
-                    high = high.min(below / along);
-                } else if along < 0.0 {
-                    low = low.max(below / along);
-                } else if below < 0.0 {
-                    high = f64::NEG_INFINITY;
-                }
+        let (mut low, mut high) = ([-half; SAMPLES], [half; SAMPLES]);
+        let mut ends = [[f64::NEG_INFINITY; SAMPLES]; 2];
+        // plane by plane, all lines at once: a plane rises alike along each of them
+        for plane in &self.planes[..self.count] {
+            let tilt = [0, 1].map(|c| plane.slope[c] - self.ground[c]);
+            let (along, over) = (tilt[axis], plane.height - self.planes[0].height);
+            let mut below = [0.0; SAMPLES];
+            for s in 0..SAMPLES {
+                let at = over + tilt[1 - axis] * place[s];
+                ends[0][s] = larger(ends[0][s], at - along * half);
+                ends[1][s] = larger(ends[1][s], at + along * half);
+                below[s] = level - at;
             }
+            if along > 0.0 {
+                (0..SAMPLES).for_each(|s| high[s] = smaller(high[s], below[s] / along));
+            } else if along < 0.0 {
+                (0..SAMPLES).for_each(|s| low[s] = larger(low[s], below[s] / along));
+            } else {
+                let outside = |s: &usize| below[*s] < 0.0;
+                (0..SAMPLES).filter(outside).for_each(|s| high[s] = f64::NEG_INFINITY);
+            }
+        }
+        let (mut rises, mut length) = (0.0, 0.0);
+        for s in 0..SAMPLES {
+            let (low, high, ends) = (low[s], high[s], [ends[0][s], ends[1][s]]);
             if high > low {
                 let enters = if low > -half { level } else { ends[0] };
                 let leaves = if high < half { level } else { ends[1] };
@@ -140,6 +154,18 @@ impl Fold {
         let inside = if falls > 0.0 { [0.5, 1.0 / falls] } else { [1.0, 0.0] };
         Face { stretch: (1.0 + a * a + b * b).sqrt(), inside }
     }
+}
+
+/// The larger of two numbers; the first where they do not compare.
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}
+
+/// The smaller of two numbers; the first where they do not compare.
+#[inline]
+fn smaller(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
 }
 
 /// Contribution of a face of an underside at each point.

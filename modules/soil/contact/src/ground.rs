@@ -26,7 +26,7 @@ pub struct Covered {
     pub depth: f64,
     /// Pressure, Pa; 0: the foot does not touch here.
     pub pressure: f64,
-    /// Pressure at which the soil yields at this depth, Pa; 0 where the foot does not touch.
+    /// Pressure at which the soil yields at this depth, Pa; 0 where the foot does not touch, or where nobody asks.
     pub virgin: f64,
     /// Height of the unloaded surface, from the unrounded state, m; NaN where the foot does not touch.
     pub surface: f64,
@@ -94,10 +94,10 @@ impl Ground {
     /// World height of the bed at a node and height of the loose soil on it, m; outside the lattice those of its edge.
     pub fn levels(&self, i: i32, j: i32) -> [f64; 2] {
         let lattice = self.heights.lattice();
-        let (u, v) = lattice.clamp(i, j);
-        let (i, j) = (u as i32, v as i32);
-        let loose = self.nodes.get(i, j).loose_left();
-        [self.heights.height(i, j) - loose, loose]
+        let (i, j) = lattice.clamp(i, j);
+        let (tile, k) = lattice.locate(i, j);
+        let loose = self.nodes.loose_left_at(tile, k);
+        [f64::from(self.heights.units_at(tile, k)) * UNIT_M - loose, loose]
     }
 
     /// Height of the loose soil on a node of the lattice, units.
@@ -140,8 +140,16 @@ impl Ground {
         if units == 0 || !self.heights.lattice().has(i, j) {
             return;
         }
-        self.heights.add_units(i, j, units);
-        self.nodes.add_loose(i, j, units);
+        let (tile, k) = self.heights.lattice().locate(i as u32, j as u32);
+        self.add_material_at(tile, k, units);
+    }
+
+    /// The same at node k of a tile; its new height in units.
+    #[inline]
+    pub fn add_material_at(&mut self, tile: usize, k: usize, units: i32) -> i32 {
+        let height = self.heights.add_units_at(tile, k, units);
+        self.nodes.add_loose_at(tile, k, units);
+        height
     }
 
     /// Puts the nodes from (i, j) on along x at `heights` (units), as [`Ground::add_material`] books it. All are nodes

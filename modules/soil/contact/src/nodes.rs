@@ -142,6 +142,12 @@ impl Kept {
         f64::from(self.loose_units()) * UNIT_M
     }
 
+    /// [`NodeState::loose_left`] of a node that no foot stands on.
+    fn loose_left(self) -> f64 {
+        let (bed, loose) = (self.permanent(), self.loose());
+        (bed - (bed - loose)).clamp(0.0, loose)
+    }
+
     /// After `units` of material have come to lie loose on the bed, or have gone from it (< 0), loose ones first. Arriving
     /// material counts to the unit, however little a short step brings. Leaving material counts in whole `TRICKLE`s, so that
     /// a slide of a few micrometres ends.
@@ -209,11 +215,24 @@ impl NodeStates {
         let lattice = self.kept.lattice();
         let (i, j) = lattice.clamp(i, j);
         let (tile, k) = lattice.locate(i, j);
-        let place = match self.tiles[tile] {
+        (tile, k, self.place_at(tile, k))
+    }
+
+    #[inline]
+    fn place_at(&self, tile: usize, k: usize) -> u32 {
+        match self.tiles[tile] {
             ABSENT => ABSENT,
             index => self.indices[index as usize].places[k],
-        };
-        (tile, k, place)
+        }
+    }
+
+    /// Remainder of the loose soil at node k of a tile, m.
+    #[inline]
+    pub fn loose_left_at(&self, tile: usize, k: usize) -> f64 {
+        match self.place_at(tile, k) {
+            ABSENT => self.kept.tile(tile).map_or(0.0, |tile| tile[k].loose_left()),
+            place => self.contacts[place as usize].loose_left(),
+        }
     }
 
     /// State of node (i, j); indices outside read the nearest node of the edge.
@@ -307,8 +326,14 @@ impl NodeStates {
     /// `units` of material came to node (i, j) or went (< 0), where no foot stands: arriving material lies loose.
     #[inline]
     pub fn add_loose(&mut self, i: i32, j: i32, units: i32) {
-        let (tile, k, place) = self.place(i, j);
-        if place == ABSENT && (units > 0 || self.kept.tile(tile).is_some()) {
+        let (tile, k, _) = self.place(i, j);
+        self.add_loose_at(tile, k, units);
+    }
+
+    /// The same at node k of a tile.
+    #[inline]
+    pub fn add_loose_at(&mut self, tile: usize, k: usize, units: i32) {
+        if self.place_at(tile, k) == ABSENT && (units > 0 || self.kept.tile(tile).is_some()) {
             let kept = &mut self.kept.tile_mut(tile)[k];
             *kept = kept.changed(units);
         }

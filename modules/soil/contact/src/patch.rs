@@ -468,6 +468,7 @@ fn read_nodes(
     for node in port.nodes(step.nodes) {
         read_node(nodes, port, node, ground, laws);
     }
+    nodes.begin_rest();
     first..nodes.index.len()
 }
 
@@ -489,12 +490,7 @@ fn read_node(nodes: &mut PatchNodes, port: &Port, node: &Node, ground: &Ground, 
     nodes.permanent.push((state.permanent - state.above) * n_z);
     nodes.bed.push(state.bed * n_z);
     nodes.loose.push(state.loose * n_z);
-    nodes.share.push(1.0);
-    nodes.passive.push([0.0; 2]);
-    nodes.bound.push(f64::NEG_INFINITY);
     nodes.before.push(state.pressure);
-    nodes.entered.push(false);
-    nodes.relief.push(f64::NAN);
     nodes.area.push(area);
     nodes.loaded_part.push(loaded_part(state.area, area));
     nodes.arm.push([along(0), along(1), along(2)]);

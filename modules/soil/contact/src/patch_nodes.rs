@@ -188,6 +188,16 @@ impl PatchNodes {
         }
     }
 
+    /// Gives nodes that were read what begins alike at all of them.
+    pub fn begin_rest(&mut self) {
+        let count = self.index.len();
+        self.share.resize(count, 1.0);
+        self.passive.resize(count, [0.0; 2]);
+        self.bound.resize(count, f64::NEG_INFINITY);
+        self.entered.resize(count, false);
+        self.relief.resize(count, f64::NAN);
+    }
+
     /// Forgets all nodes; keeps the room.
     pub fn clear(&mut self) {
         self.index.clear();

@@ -32,6 +32,9 @@ pub trait Material: Send {
     /// Exact copy of its own committed state.
     type Saved: Default + Send + Persist;
 
+    /// Whether it reads [`Covered::virgin`].
+    const READS_VIRGIN: bool = true;
+
     /// Looks at the ground before the first step, and may bring it to rest.
     ///
     /// # Errors
@@ -121,6 +124,8 @@ impl<M: Material> FieldSoil<M> {
         lists.reserve(nodes);
         let mut compatibility = Compatibility::default();
         compatibility.reserve(nodes);
+        let mut last = Last::default();
+        last.reserve(nodes);
         let laws = all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?;
         if parameters.elastic_stiffness_pa_m.is_some() {
             warn_of_module(&laws[0], host.as_ref());
@@ -132,7 +137,7 @@ impl<M: Material> FieldSoil<M> {
             fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
             slots: Slots::new(host.slots()),
             ledger: EnergyLedger::default(),
-            last: Last::default(),
+            last,
             compatibility,
             few_nodes: 0,
             warned: [false; 2],
@@ -388,7 +393,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         }
         self.build(step)?;
         let prints = self.patches.prints;
-        let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
+        let scene = bookkeeping::Scene { patches: &self.patches, h: step.h, virgin: M::READS_VIRGIN };
         let heat = self.ledger.dissipated;
         let taken =
             scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.ledger);

@@ -1,5 +1,6 @@
 //! Trials of a soil under motion or force, and the derivatives at the last one.
 
+use crate::assemble::Noted;
 use crate::patch::{Patch, Patches};
 use crate::vectors::Stiffness;
 use terraglue_subsystem::{Error, Level, Motion, Response, Result};
@@ -24,11 +25,19 @@ pub struct Last {
     /// Per port the foot's X, with the soil's answer along n after a force.
     x: Vec<[f64; 6]>,
     normal: Vec<f64>,
+    /// Answers of the laws to a motion.
+    noted: Noted,
 }
 
 impl Last {
+    /// Room for `nodes` nodes of all contacts.
+    pub fn reserve(&mut self, nodes: usize) {
+        self.noted.reserve(nodes);
+    }
+
     /// Forgets the trial.
     pub fn clear(&mut self) {
+        self.noted.clear();
         self.kind = Kind::None;
         self.x.clear();
         self.normal.clear();
@@ -44,7 +53,7 @@ impl Last {
         out.v.fill(0.0);
         for p in 0..patches.ports.len() {
             let x = patches.ports[p].unpack(motion.x);
-            let wrench = patches.wrench(p, &x)?;
+            let wrench = patches.noted_wrench(p, &x, &mut self.noted)?;
             let mut surface = x;
             if wrench[0] != 0.0 {
                 patches.ports[p].pack(&patches.ports[p].unpack(motion.v), out.v);
@@ -100,10 +109,11 @@ impl Last {
             _ => return Err(Error::Unsupported),
         }
         for p in 0..self.x.len() {
-            let k = patches.stiffness(p, &self.x[p])?;
-            let block = match self.kind {
-                Kind::Motion => k,
-                kind => hybrid(&k, self.normal_stiffness(patches, p, &k)?, kind == Kind::Hybrid),
+            let block = if self.kind == Kind::Motion {
+                patches.noted_stiffness(p, &self.x[p], &self.noted)
+            } else {
+                let k = patches.stiffness(p, &self.x[p])?;
+                hybrid(&k, self.normal_stiffness(patches, p, &k)?, self.kind == Kind::Hybrid)
             };
             scatter(&patches.ports[p], &block, n, out);
         }

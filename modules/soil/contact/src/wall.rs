@@ -202,13 +202,14 @@ const MOST_CELLS: i32 = 32;
 
 impl Beside<'_> {
     /// Mean height (m) of the loose soil on the wedge beside node `at` that a wall pushes up, towards the neighbour `way`;
-    /// `height` of the wall in the bed, m. Loose soil on the wedge loads it, wherever it lies.
-    fn loose(&self, at: [i32; 2], way: (i32, i32), height: f64) -> f64 {
+    /// `height` of the wall in the bed, m. Loose soil on the wedge loads it, wherever it lies. `next`: that on the neighbour, if known.
+    fn loose(&self, at: [i32; 2], way: (i32, i32), height: f64, next: Option<f64>) -> f64 {
         let cells = (self.wedge * height / self.lattice.spacing).clamp(1.0, f64::from(MOST_CELLS));
         let (mut sum, mut left, mut k) = (0.0, cells, 0);
         while left > 0.0 {
             k += 1;
-            let [_, loose] = (self.levels)(at[0] + k * way.0, at[1] + k * way.1);
+            let there = || (self.levels)(at[0] + k * way.0, at[1] + k * way.1)[1];
+            let loose = next.filter(|_| k == 1).unwrap_or_else(there);
             sum += left.min(1.0) * loose;
             left -= 1.0;
         }
@@ -284,10 +285,16 @@ fn faces(nodes: &PatchNodes, k: usize, beside: &Beside, rows: &Rows) -> [[f64; 3
         let next = rows.beside(cell, [di, dj]);
         let outside = own - covered(next);
         // soil in a cell that is covered in part stands as high as it did before it was pressed
-        let bed = next.map_or_else(|| (beside.levels)(i + di, j + dj)[0], |k| nodes.reference[k]);
+        let (bed, loose) = match next {
+            Some(k) => (nodes.reference[k], None),
+            None => {
+                let [bed, loose] = (beside.levels)(i + di, j + dj);
+                (bed, Some(loose))
+            }
+        };
         let above = bed - lower;
         if outside > 0.0 && above > 0.0 {
-            let (width, on_bed) = (outside * spacing, beside.loose([i, j], (di, dj), above));
+            let (width, on_bed) = (outside * spacing, beside.loose([i, j], (di, dj), above, loose));
             *face = [width, width * above, width * on_bed];
         }
     }

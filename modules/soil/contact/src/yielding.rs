@@ -65,16 +65,25 @@ impl Patches {
     /// The law, which is a module, has no answer.
     #[inline]
     pub fn pressure(&self, k: usize, z: f64) -> Result<(f64, f64)> {
+        Ok(self.pressure_and_yield(k, z)?.0)
+    }
+
+    /// The same with the pressure at which the node yields there, where that was needed.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    #[inline]
+    pub fn pressure_and_yield(&self, k: usize, z: f64) -> Result<((f64, f64), Option<f64>)> {
         let (n, k_u) = (&self.nodes, self.law(k).curve.unloading());
         let elastic = k_u * (z - n.permanent[k]);
         if elastic <= 0.0 {
-            return Ok(self.clinging_at(k, z));
+            return Ok((self.clinging_at(k, z), None));
         }
         if elastic <= n.bound[k] {
-            return Ok((elastic, k_u));
+            return Ok(((elastic, k_u), None));
         }
         let yields = self.yields(k, z)?;
-        Ok(if elastic <= yields.0 { (elastic, k_u) } else { yields })
+        Ok((if elastic <= yields.0 { (elastic, k_u) } else { yields }, Some(yields.0)))
     }
 
     /// Tension at node k above the unloaded surface, Pa (< 0), and its slope.

@@ -108,7 +108,8 @@ mod tests {
     #[test]
     fn what_a_program_says_and_leaves_is_told() {
         let ended = shell(
-            "echo row; echo error: no >&2; echo later >&2; touch $TMPDIR/file; setsid sleep 98 & exit 3",
+            "echo row; echo error: no >&2; echo later >&2; setsid sh -c 'touch $TMPDIR/file; kill -STOP $$' & \
+             while [ ! -e $TMPDIR/file ]; do :; done; exit 3",
             Duration::from_secs(60),
         );
         assert_eq!(

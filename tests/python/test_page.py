@@ -471,6 +471,7 @@ def test_a_scenario_says_how_its_page_looks_at_first(tmp_path):
             page.wait_for_function("document.querySelectorAll('.scope-plot').length === 2")
             assert page.locator(".props-head h2").inner_text() == "robot.LM_j2"
             menus = page.locator(".view-bar select")
+            page.wait_for_function("document.querySelector('.view-bar select').value === 'side'")
             assert [menus.nth(k).input_value() for k in (0, 1)] == ["side", "height"]
             assert [b.get_attribute("data-layer") for b in page.locator("[data-layer]").all() if b.is_checked()] == ["torques", "support"]
             page.wait_for_function("document.querySelector('.topbar .pill').textContent.includes('ended')")

@@ -28,7 +28,7 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
     }
     let i = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
     let j = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
-    let below = Below { shape, bounds: &bounds, margin, i, j };
+    let below = Footprint { shape, bounds: &bounds, margin, i, j };
     // at the rim each node is asked for its neighbours
     match Excerpt::around(surface, i, j) {
         Some(excerpt) => below.list(&excerpt, out),
@@ -37,7 +37,7 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
 }
 
 /// What [`nodes_below`] looks for: the ranges of the nodes along x and y, ends included.
-struct Below<'a> {
+struct Footprint<'a> {
     shape: &'a Placed,
     bounds: &'a Aabb,
     margin: f64,
@@ -45,7 +45,7 @@ struct Below<'a> {
     j: (i32, i32),
 }
 
-impl Below<'_> {
+impl Footprint<'_> {
     fn list<S: Surface + ?Sized>(&self, surface: &S, out: &mut Vec<Node>) {
         let Self { shape, bounds, margin, i: (i0, i1), j: (j0, j1) } = *self;
         let (lattice, outline) = (surface.lattice(), Outline::of(shape));

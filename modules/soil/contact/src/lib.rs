@@ -27,6 +27,7 @@ mod cone;
 mod contact_memory;
 mod contacts;
 mod fold;
+mod gaps;
 mod ground;
 mod grousers;
 mod law_memory;

@@ -190,7 +190,7 @@ impl Patches {
             let range = read_nodes(&mut self.nodes, port, step, ground, laws);
             self.ranges.push(range);
         }
-        self.share_nodes(step, ground, laws);
+        share_nodes(&mut self.nodes, &self.ranges, step, ground, laws);
         for (number, port) in step.ports.iter().enumerate() {
             let patch = self.read_port(port, self.ranges[number].clone(), step, ground, laws)?;
             self.ports.push(patch);
@@ -213,13 +213,7 @@ impl Patches {
         self.rows.list(&self.nodes, range.clone());
         let n_z = port.frame[2];
         let spacing = ground.heights.lattice().spacing;
-        let rolls = port.extent[0] > 0.0 && port.extent[1] > 0.0;
-        let memory = rolls.then(|| recall(&ground.wheels, port.key));
-        let wheel = memory.and_then(|memory| Wheel::find(&self.nodes, range.clone(), spacing, memory));
-        if let Some(wheel) = &wheel {
-            wheel.fill_gaps(&mut self.nodes, port, range.clone());
-        }
-        let wheel = wheel.and_then(|wheel| wheel.loaded(&self.nodes, range.clone(), spacing));
+        let wheel = rolling(&mut self.nodes, port, range.clone(), ground);
         if !laws.iter().any(|law| law.pressure.keeps()) {
             self.nodes.fill_cells(port, range.clone(), spacing, &mut self.rows);
         }
@@ -426,22 +420,6 @@ impl Patches {
         Ok(())
     }
 
-    /// Of a node that two ports cover, the deeper one takes the area of both, see [`PatchNodes::share_between`].
-    fn share_nodes(&mut self, step: &Step, ground: &Ground, laws: &[Laws]) {
-        let spacing = ground.heights.lattice().spacing;
-        let loaded = |[i, j]: [i32; 2]| ground.nodes.get(i, j).area;
-        for b in 1..self.ranges.len() {
-            for a in 0..b {
-                let (ports, nodes) = ([&step.ports[a], &step.ports[b]], step.nodes);
-                if overlap(ports[0].nodes(nodes), ports[1].nodes(nodes)) {
-                    let cells = ports.map(|port| spacing * spacing / port.frame[2]);
-                    let (a, b) = (self.ranges[a].clone(), self.ranges[b].clone());
-                    self.nodes.share_between([a, b], cells, |law| laws[law].elastic, loaded);
-                }
-            }
-        }
-    }
-
     fn evaluate_at_rest(&mut self, p: usize) -> Result {
         let (force, strength) = self.at_rest(p)?;
         let pull = self.pull(p);
@@ -454,6 +432,44 @@ impl Patches {
         (patch.force, patch.strength, patch.surface, patch.pull) = (force, strength, surface, pull);
         Ok(())
     }
+}
+
+/// Of a node that two ports cover, the deeper one takes the area of both, see [`PatchNodes::share_between`].
+fn share_nodes(
+    nodes: &mut PatchNodes,
+    ranges: &[std::ops::Range<usize>],
+    step: &Step,
+    ground: &Ground,
+    laws: &[Laws],
+) {
+    let spacing = ground.heights.lattice().spacing;
+    let loaded = |[i, j]: [i32; 2]| ground.nodes.get(i, j).area;
+    for b in 1..ranges.len() {
+        for a in 0..b {
+            let ports = [&step.ports[a], &step.ports[b]];
+            if overlap(ports[0].nodes(step.nodes), ports[1].nodes(step.nodes)) {
+                let cells = ports.map(|port| spacing * spacing / port.frame[2]);
+                let (a, b) = (ranges[a].clone(), ranges[b].clone());
+                nodes.share_between([a, b], cells, |law| laws[law].elastic, loaded);
+            }
+        }
+    }
+}
+
+/// The wheel whose underside the nodes in `range` below `port` are, with the soil that turns with it.
+fn rolling(
+    nodes: &mut PatchNodes,
+    port: &Port,
+    range: std::ops::Range<usize>,
+    ground: &Ground,
+) -> Option<Wheel> {
+    if port.extent[0] <= 0.0 || port.extent[1] <= 0.0 {
+        return None;
+    }
+    let (spacing, memory) = (ground.heights.lattice().spacing, recall(&ground.wheels, port.key));
+    let wheel = Wheel::find(nodes, range.clone(), spacing, memory)?;
+    wheel.fill_gaps(nodes, port, range.clone());
+    wheel.loaded(nodes, range, spacing)
 }
 
 /// Reads the nodes of a port; row by row.

@@ -1,7 +1,7 @@
 //! Dense linear systems of moderate size (n ≲ 100), solved in place. Storage is reused from system to system, so a step allocates nothing;
 //! the factorisations of libraries take new memory for every matrix.
 
-use crate::in_place::{add_four, four, reduce};
+use crate::in_place::{add_four, four, next_column};
 
 /// LU factors with partial pivoting of an n × n matrix, kept by columns; the storage is reused.
 ///
@@ -48,16 +48,7 @@ impl Lu {
         let n = self.n;
         let (left, right) = self.factors.split_at_mut(k * n);
         let column = &mut right[..n];
-        self.pivots.iter().enumerate().for_each(|(i, pivot)| column.swap(i, *pivot));
-        reduce(column, left);
-        let largest =
-            |best: usize, row: usize| if column[row].abs() > column[best].abs() { row } else { best };
-        let pivot = (k + 1..n).fold(k, largest);
-        self.pivots.push(pivot);
-        if pivot != k {
-            column.swap(k, pivot);
-            left.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
-        }
+        next_column(left, column, &mut self.pivots);
         let regular = column[k].abs() > tiny;
         if !regular {
             column[k] = tiny.copysign(column[k]);

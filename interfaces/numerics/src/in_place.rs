@@ -22,7 +22,7 @@ pub(crate) fn add_four(y: &mut [f64], [a, b, c, d]: [&[f64]; 4], first: usize, [
 
 /// Takes the columns `factors` (below the diagonal, which is 1), eliminated before, out of the next one; at the front of it stands its
 /// part of U. The same solves L·x = b.
-pub fn reduce(column: &mut [f64], factors: &[f64]) {
+fn reduce(column: &mut [f64], factors: &[f64]) {
     let n = column.len().max(1);
     let fours = factors.chunks_exact(4 * n);
     let (mut i, rest) = (0, fours.remainder());
@@ -113,6 +113,21 @@ pub fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
     }
 }
 
+/// The next `column` of an LU: its rows change places as those of the columns `left` have (`order`: which takes whose place), these
+/// are taken out of it, and the row of its largest entry that is left comes to its diagonal, in all of them.
+#[inline]
+pub fn next_column(left: &mut [f64], column: &mut [f64], order: &mut Vec<usize>) {
+    let (n, j) = (column.len(), order.len());
+    order.iter().enumerate().for_each(|(i, p)| column.swap(i, *p));
+    reduce(column, left);
+    let p = (j + 1..n).fold(j, |best, i| if column[i].abs() > column[best].abs() { i } else { best });
+    order.push(p);
+    if p != j {
+        column.swap(j, p);
+        left.chunks_exact_mut(n).for_each(|column| column.swap(j, p));
+    }
+}
+
 /// Overwrites `a` (n × n) with its factors L (below the diagonal, which is 1) and U; `order`: which row takes whose place,
 /// largest pivots first. False: singular.
 #[inline]
@@ -121,19 +136,12 @@ pub fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
     for j in 0..n {
         let (left, right) = a.split_at_mut(j * n);
         let column = &mut right[..n];
-        order.iter().enumerate().for_each(|(i, p)| column.swap(i, *p));
-        reduce(column, left);
-        let p = (j + 1..n).fold(j, |best, i| if column[i].abs() > column[best].abs() { i } else { best });
-        let pivot = column[p];
+        next_column(left, column, order);
+        let pivot = column[j];
         if pivot == 0.0 || !pivot.is_finite() {
             return false;
         }
-        order.push(p);
-        column.swap(j, p);
         column[j + 1..].iter_mut().for_each(|f| *f /= pivot);
-        if p != j {
-            left.chunks_exact_mut(n).for_each(|column| column.swap(j, p));
-        }
     }
     true
 }
@@ -143,7 +151,7 @@ pub fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
 pub fn lu_solve(n: usize, a: &[f64], order: &[usize], x: &mut [f64]) {
     order.iter().enumerate().for_each(|(j, p)| x.swap(j, *p));
     reduce(x, a);
-    for (j, column) in a.chunks_exact(n).enumerate().rev() {
+    for (j, column) in a.chunks_exact(n.max(1)).enumerate().rev() {
         x[j] /= column[j];
         let (above, rest) = x.split_at_mut(j);
         above.iter_mut().zip(column).for_each(|(v, u)| *v -= u * rest[0]);

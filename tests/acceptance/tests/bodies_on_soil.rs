@@ -194,10 +194,14 @@ fn two_plates_that_share_cells_bear_as_one() {
 const RIM: f64 = 0.044;
 const LUGS: i32 = 20;
 
-/// A wheel whose axle is y with plates on its rim, as a cylinder and boxes.
+/// A wheel whose axle is y.
+fn smooth_wheel(radius: f64) -> String {
+    collision(&format!("<cylinder radius=\"{radius}\" length=\"0.1\"/>"), [0.0; 3], [PI / 2.0, 0.0, 0.0])
+}
+
+/// The same with plates on its rim, as a cylinder and boxes.
 fn wheel_with_plates() -> String {
-    let mut all =
-        collision(&format!("<cylinder radius=\"{RIM}\" length=\"0.1\"/>"), [0.0; 3], [PI / 2.0, 0.0, 0.0]);
+    let mut all = smooth_wheel(RIM);
     let (middle, height) = (0.5 * (RADIUS + RIM - 0.002), RADIUS - RIM + 0.002);
     for k in 0..LUGS {
         let angle = TAU * f64::from(k) / f64::from(LUGS);
@@ -251,11 +255,7 @@ fn wheel_rolled(shape: &str, soil: &str, strategy: &str, yaw: f64) -> [f64; 2] {
     let shapes = match shape {
         "plates" => wheel_with_plates(),
         "lugs" => wheel_with_lugs(place.path()),
-        _ => collision(
-            &format!("<cylinder radius=\"{RADIUS}\" length=\"0.1\"/>"),
-            [0.0; 3],
-            [PI / 2.0, 0.0, 0.0],
-        ),
+        _ => smooth_wheel(RADIUS),
     };
     let body = link("b", MASS, 0.4 * MASS * RADIUS * RADIUS, &shapes);
     let (sin, cos) = yaw.sin_cos();

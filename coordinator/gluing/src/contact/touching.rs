@@ -2,6 +2,7 @@
 
 use super::shape::Shape;
 use terraglue_ground::{Aabb, Part, Placed, bounds_of};
+use terraglue_numerics::rotation::{dot, minus};
 use terraglue_subsystem::Geometry;
 
 /// Of the radius of a mesh with dents, how far soil between its lugs may stand out of it.
@@ -61,10 +62,10 @@ impl<'a> Touching<'a> {
             _ if !main.is_convex() => LUGS * self.largest.size,
             Geometry::Cylinder { radius, .. } => self.each().fold(0.0, |most: f64, shape| {
                 let axis = main.rotation().0[2];
-                let out = across(axis, difference(shape.placed.pose().position, main.pose().position));
+                let out = across(axis, minus(shape.placed.pose().position, main.pose().position));
                 let size = dot(out, out).sqrt();
                 let direction = out.map(|c| c / size);
-                let far = dot(difference(shape.placed.support(direction), main.pose().position), direction);
+                let far = dot(minus(shape.placed.support(direction), main.pose().position), direction);
                 if size > 0.0 { most.max(far - radius) } else { most }
             }),
             _ => 0.0,
@@ -88,16 +89,8 @@ pub fn part(shape: &Shape) -> Part<'_> {
     Part { placed: &shape.placed, bounds: &shape.bounds }
 }
 
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 /// Part of a vector across a unit vector.
 fn across(axis: [f64; 3], v: [f64; 3]) -> [f64; 3] {
     let along = dot(axis, v);
     [0, 1, 2].map(|k| v[k] - along * axis[k])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -9,7 +9,7 @@ use crate::assemble::Noted;
 use crate::patch::Patches;
 use crate::vectors::Stiffness;
 use terraglue_numerics::dense::multiply_add;
-use terraglue_numerics::in_place::reduce;
+use terraglue_numerics::in_place::{lu_solve, next_column};
 use terraglue_subsystem::{Estimate, Result};
 
 /// Newton steps at most.
@@ -33,8 +33,8 @@ pub struct Compatibility {
     noted: Noted,
     /// [I + K·G | −r], column-major n × (n + 1).
     matrix: Vec<f64>,
-    /// Rows of it that have changed places.
-    pivots: Vec<(usize, usize)>,
+    /// Which of its rows takes whose place.
+    order: Vec<usize>,
 }
 
 impl Compatibility {
@@ -94,7 +94,7 @@ impl Compatibility {
     /// d = −(I + K·G)⁻¹·r at the motion of the last evaluation; whether there is one.
     fn newton(&mut self, patches: &Patches, n: usize, g: &[f64]) -> bool {
         self.matrix.clear();
-        self.matrix.resize(n * (n + 1), 0.0);
+        self.matrix.resize(n * n, 0.0);
         (0..n).for_each(|c| self.matrix[c * n + c] = 1.0);
         for (p, patch) in patches.ports.iter().enumerate() {
             let block = patches.noted_stiffness(p, &patch.unpack(&self.x), &self.noted);
@@ -103,11 +103,11 @@ impl Compatibility {
                 add_product(&patch.place, &block, g, &mut self.matrix, n);
             }
         }
-        self.matrix[n * n..].iter_mut().zip(&self.residual).for_each(|(m, r)| *m = -r);
-        if !eliminate(&mut self.matrix, n, &mut self.pivots) || !substitute(&mut self.matrix, n) {
+        if !eliminate(&mut self.matrix, n, &mut self.order) {
             return false;
         }
-        self.d.copy_from_slice(&self.matrix[n * n..]);
+        self.d.iter_mut().zip(&self.residual).for_each(|(d, r)| *d = -r);
+        lu_solve(n, &self.matrix, &self.order, &mut self.d);
         true
     }
 
@@ -178,45 +178,20 @@ fn six_mut(all: &mut [f64], first: usize) -> Option<&mut [f64; 6]> {
     all.get_mut(first..)?.first_chunk_mut()
 }
 
-/// Gauss's elimination of [A | b] (column-major n × (n + 1)) with the largest pivot of each column; whether there is one.
-/// `pivots`: rows that change places.
-fn eliminate(matrix: &mut [f64], n: usize, pivots: &mut Vec<(usize, usize)>) -> bool {
-    pivots.clear();
-    for c in 0..=n {
+/// LU of the n × n `matrix` (column-major) with the largest pivot of each column; whether there is one. `order`: which row takes
+/// whose place.
+fn eliminate(matrix: &mut [f64], n: usize, order: &mut Vec<usize>) -> bool {
+    order.clear();
+    for c in 0..n {
         let (factors, column) = matrix.split_at_mut(c * n);
         let column = &mut column[..n];
-        pivots.iter().for_each(|(i, p)| column.swap(*i, *p));
-        reduce(column, factors);
-        if c == n {
-            break;
-        }
-        let pivot = (c + 1..n).fold(c, |best, r| if column[r].abs() > column[best].abs() { r } else { best });
-        let diagonal = column[pivot];
+        next_column(factors, column, order);
+        let diagonal = column[c];
         if diagonal == 0.0 || !diagonal.is_finite() {
             return false;
         }
-        if pivot != c {
-            pivots.push((c, pivot));
-            column.swap(c, pivot);
-            factors.chunks_exact_mut(n).for_each(|factors| factors.swap(c, pivot));
-        }
         let inverse = 1.0 / diagonal;
         column[c + 1..].iter_mut().for_each(|f| *f *= inverse);
-    }
-    true
-}
-
-/// Solves the upper triangle that [`eliminate`] left; the solution takes the place of the last column.
-fn substitute(matrix: &mut [f64], n: usize) -> bool {
-    let (upper, right) = matrix.split_at_mut(n * n);
-    for i in (0..n).rev() {
-        let diagonal = upper[i * n + i];
-        if diagonal == 0.0 {
-            return false;
-        }
-        right[i] /= diagonal;
-        let lead = -right[i];
-        right[..i].iter_mut().zip(&upper[i * n..i * n + i]).for_each(|(x, u)| *x += lead * u);
     }
     true
 }

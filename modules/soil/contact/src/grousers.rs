@@ -109,7 +109,7 @@ impl Rim {
         fine.or_else(|| points.into_iter().all(|(p, _)| rough.may_hold(p)).then_some(rough))
     }
 
-    /// Whether its radius is another one, m.
+    /// Whether its radius is about `radius`, m.
     pub fn has(&self, radius: f64) -> bool {
         (self.radius - radius).abs() < HEIGHTS[0] * radius
     }
@@ -265,7 +265,7 @@ impl Grousers {
         }
         let found = &mut angles[..count];
         found.sort_unstable_by(f64::total_cmp);
-        let known = if self.pitch > 0.0 { self.pitch } else { f64::INFINITY };
+        let known = if self.is_sure() { self.pitch } else { f64::INFINITY };
         let pitch = found.windows(2).fold(known, |least, pair| least.min(pair[1] - pair[0]));
         Self { height: highest, pitch: if pitch.is_finite() { pitch } else { 0.0 } }
     }

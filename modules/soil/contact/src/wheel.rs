@@ -8,6 +8,7 @@ use crate::contact_memory::Remembered;
 use crate::grousers::{Grousers, Point, Rim, Section, is_across};
 use crate::patch_nodes::PatchNodes;
 use crate::vectors::dot;
+use terraglue_numerics::rotation::cross;
 use terraglue_soil_law::Rolling;
 
 /// Largest squared distance of nodes from the circle over their squared distance from the lowest line.
@@ -86,14 +87,15 @@ impl Wheel {
             let section = Section::new(heading, lean);
             let points = inner().map(|k| (section.of(nodes.arm[k]), section.of(nodes.facing[k].inward())));
             // few nodes at edges do not tell a rim behind grousers
-            let tells = least > 0.0 || memory.grousers.is_sure();
-            let (radius, rim) = match tells {
-                true => circle(points.clone(), &memory)?,
-                false => (radius(points.clone())?, None),
+            let (radius, rim) = if least > 0.0 || memory.grousers.is_sure() {
+                circle(points.clone(), &memory)?
+            } else {
+                (radius(points.clone())?, None)
             };
-            let before = Some(memory.grousers).filter(|_| rim.is_some_and(|rim| rim.has(memory.radius)));
-            let before = before.unwrap_or_default();
-            let grousers = rim.map_or(before, |rim| before.seen(&rim, points.filter(is_across)));
+            let grousers = rim.map_or(Grousers::default(), |rim| {
+                let before = if rim.has(memory.radius) { memory.grousers } else { Grousers::default() };
+                before.seen(&rim, points.filter(is_across))
+            });
             Some((Memory { radius, heading, lean, grousers, ..memory }, rim))
         });
         let known = (memory.radius > 0.0).then_some((memory, None));
@@ -282,10 +284,6 @@ fn across_axle(normals: impl Iterator<Item = [f64; 3]>, heading: [f64; 2]) -> Op
     let ahead = [axle[2] / level, -axle[1] / level];
     let sign = if ahead[0] * heading[0] + ahead[1] * heading[1] < 0.0 { -1.0 } else { 1.0 };
     Some((ahead.map(|c| sign * c), libm::atan2(-sign * axle[0], level)))
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Radius of the circle on which the points lie, and the rim where grousers stand out of it or were known to do so; `None` where they

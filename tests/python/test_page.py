@@ -1,6 +1,7 @@
 """The operator's view: the replay of a report, a picture of a run, and the page of a run that is going on, in a real browser."""
 
 import base64
+import json
 import os
 import struct
 
@@ -341,6 +342,45 @@ def test_a_recording_is_replayed_by_the_same_page(walk):
         page.locator(".line-track").click(position={"x": page.locator(".line-track").bounding_box()["width"] * 0.9, "y": 15})
         page.wait_for_function("parseFloat(document.querySelector('.topbar .time').textContent.slice(4)) > 1.5")
         assert different(early, steady(page, lambda: pixels(page))) > 0.002
+        assert page.errors == []
+
+
+def shapes_late(page):
+    """Lets the page have the shapes of a run only after it has had the poses."""
+    scene, held, asked = [], [], []
+
+    def without_shapes(route):
+        url = route.request.url
+        route.fulfill(response=route.fetch(url=url.replace("%2Fscene%2C", "").replace("%2C%2Fscene", "")))
+        asked.append(url)
+
+    def filtered(socket):
+        server = socket.connect_to_server()
+
+        def take(message):
+            if isinstance(message, str):
+                found = json.loads(message)
+                scene.extend(c["id"] for c in found.get("channels", []) if c["topic"] == "/scene")
+            elif message[0] == 1 and struct.unpack_from("<I", message, 1)[0] in scene:
+                held.append(message)
+                return
+            socket.send(message)
+            if asked and held:
+                socket.send(held.pop())
+
+        server.on_message(take)
+
+    page.route("**/at?*", without_shapes)
+    page.route_web_socket("**/ws?*", filtered)
+    return asked
+
+
+def test_a_recording_whose_shapes_arrive_after_its_poses_is_shown(walk):
+    with served(walk) as address, opened(viewport={"width": 600, "height": 400}) as page:
+        asked = shapes_late(page)
+        page.goto(address)
+        ready(page)
+        assert asked, "the poses were asked for"
         assert page.errors == []
 
 

@@ -37,7 +37,7 @@ export class Stage {
   // How a topic is taken, by what it is; null: not shown.
   taker(topic) {
     const schema = this.run.link.byTopic.get(topic)?.schemaName ?? "";
-    if (topic === "/scene") return (m) => takeScene(this.view.entities, m);
+    if (topic === "/scene") return (m) => this.takeShapes(m);
     if (topic === "/tf") return (m) => this.takePoses(m);
     if (topic === "/contact_forces") return (m) => this.takeForces(m);
     if (topic === "/ground/tiles") return (m) => this.takeGround(m);
@@ -81,9 +81,20 @@ export class Stage {
       if (translation && rotation) this.view.poses.set(frame, { p: vector(translation), q: quaternion(rotation) });
     }
     this.takeCentre();
-    if (!this.first || !transforms.length || !this.view.entities.size) return;
+    this.beginView();
+  }
+
+  takeShapes(message) {
+    takeScene(this.view.entities, message);
+    this.beginView();
+  }
+
+  // The view begins once both shapes and poses are known, whichever come first: a run that stands still sends neither again.
+  beginView() {
+    const { poses, entities } = this.view;
+    if (!this.first || !poses.size || !entities.size) return;
     this.first = false;
-    this.view.body ??= transforms[0].child_frame_id;
+    this.view.body ??= poses.keys().next().value;
     this.view.fit();
     this.watchCentre();
     this.run.tell("staged");

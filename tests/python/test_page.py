@@ -286,11 +286,15 @@ def test_a_reload_brings_everything_back(live):
     select(page, "LM_j2 torque")
     page.wait_for_function("location.hash.includes('LM_j2')")
     plots = page.locator(".scope-plot").count()
+    page.wait_for_function("document.getElementById('prop-robot.LM_j2.max_torque')?.value === '60'")
+    page.locator('[id="prop-robot.LM_j2.max_torque"]').fill("50")
+    page.locator('[id="prop-robot.LM_j2.max_torque"]').press("Enter")
+    page.wait_for_function("document.querySelectorAll('.changes li:not(.empty)').length >= 1")
     page.reload()
     ready(page)
     page.wait_for_function("(n) => document.querySelectorAll('.scope-plot path.curve').length >= n", arg=plots)
     assert page.locator(".props-head h2").inner_text() == "robot.LM_j2"
-    assert page.locator(".changes li:not(.empty)").count() >= 1
+    page.wait_for_function("document.querySelectorAll('.changes li:not(.empty)').length >= 1")
 
 
 def test_nothing_of_the_page_is_wider_than_a_phone(live):

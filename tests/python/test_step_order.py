@@ -317,3 +317,35 @@ def test_a_source_without_derivatives_is_refused(tmp_path):
     squares(tmp_path, 2)
     done = summed(tmp_path, "derivatives", more="isolate = true")
     assert done.returncode == 2 and "isolated" in done.stderr, done.stderr
+
+
+# makes steps in two halves between 45 and 55 ms: the step of the others is discarded and made again
+HALVES = "if (t > 0.045 && t < 0.055 && h > 0.006) return 2; r[1] += 1.0;"
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+@pytest.mark.parametrize(
+    "keys, mean", [('order = "jacobi"', 0.0), ('extrapolate = "linear"\norder = "jacobi"', 0.5), ("", 1.0)], ids=["jacobi", "linear", "structure"]
+)
+def test_a_step_that_another_discards_leaves_no_trace(tmp_path, keys, mean, isolate):
+    # y = t; the sum takes its input as it is held, and shows it at once where the order is to be seen
+    build(tmp_path, "clock", [("y", "output", 0.0, "")], "r[0] = t + h;", depends="")
+    own = "1" if mean == 1.0 else ""
+    build(tmp_path, "sum", [("u", "input", 0.0, ""), ("x", "output", 0.0, ""), ("y", "output", 0.0, "")], "r[1] += h * r[0]; r[2] = r[0];", depends={"y": own, "x": ""})
+    build(tmp_path, "halves", [("u", "input", 0.0, ""), ("n", "output", 0.0, "")], HALVES, depends="1")
+    more = "isolate = true\n" if isolate else ""
+    text = "[time]\nstep_s = 0.01\nduration_s = 0.1\n"
+    text += "".join(f'[{name}]\nfmu = "{name}.fmu"\n{more}' for name in ("clock", "sum", "halves"))
+    text += f'[[connect]]\nfrom = "clock.y"\nto = "sum.u"\n{keys}\n'
+    text += '[[connect]]\nfrom = "sum.y"\nto = "halves.u"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    last = list(csv.DictReader((tmp_path / "out/variables.csv").open()))[-1]
+    assert float(last["halves.n"]) == 11
+    ends = [k / 100 for k in range(11)]
+    ends.insert(6, 0.055)
+    steps = list(zip(ends, ends[1:]))
+    # a line needs two values: the first step is held
+    held = [a if k == 0 and mean == 0.5 else a + mean * (b - a) for k, (a, b) in enumerate(steps)]
+    assert float(last["sum.x"]) == pytest.approx(sum(u * (b - a) for u, (a, b) in zip(held, steps)), abs=1e-14)

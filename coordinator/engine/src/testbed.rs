@@ -196,10 +196,11 @@ impl Testbed {
         self.report.clear();
         self.report.converged = true;
         self.streams.clear();
+        let mut repeated = false;
         while self.clock.is_before(end) {
             let (start, times) = uncoupled::watch(&self.clock, !self.glued.groups.is_empty());
             self.apply_events()?;
-            self.transfer_signals(time_left(self, end).min(longest))?;
+            self.transfer_signals(time_left(self, end).min(longest), repeated)?;
             self.timings.charge_sample(Part::Signals, start, times);
             let left = time_left(self, end);
             let h_now = self.glued.next_length((longest, left), &self.clock, &mut self.subsystems)?;
@@ -207,6 +208,7 @@ impl Testbed {
                 Outcome::Converged => {
                     self.clock.advance(h_now);
                     self.glued.account(&mut self.report);
+                    repeated = false;
                 }
                 Outcome::NotConverged(why) if self.halvings == self.max_halvings => {
                     self.glued.account(&mut self.report);
@@ -216,6 +218,7 @@ impl Testbed {
                     self.glued.groups.iter().for_each(|g| self.report.add_cost(&g.problem.report));
                     self.halvings += 1;
                     longest = 0.5 * h_now;
+                    repeated = true;
                 }
             }
         }
@@ -239,14 +242,17 @@ impl Testbed {
         Ok(())
     }
 
-    /// (2) Outputs of t become inputs of the step of length h.
-    fn transfer_signals(&mut self, h: f64) -> Result {
+    /// (2) Outputs of t become inputs of the step of length h; `repeated`: of one that was discarded with a greater length.
+    fn transfer_signals(&mut self, h: f64, repeated: bool) -> Result {
         let instances = &mut self.subsystems.instances;
         if self.clock.index == 0 && self.clock.t == 0.0 {
             self.signals.initialize(instances)?;
         }
         let (t_s, events) = (self.clock.t, &mut self.events);
         let moment = Moment { t: t_s, h, nominal: self.clock.nominal };
+        if repeated {
+            return self.signals.transfer_again(moment, instances);
+        }
         self.signals.transfer(moment, self.clock.step_s, instances, |(label, begins)| {
             let what = format!("fault {}: {label}", if begins { "begins" } else { "ends" });
             events.push(Event { t_s, what });
@@ -273,6 +279,8 @@ impl Testbed {
             self.streams.collect(&self.subsystems.instances, |stream, bytes| {
                 self.signals.links.feed(stream, bytes)
             })?;
+        } else {
+            self.uncoupled.discard(&mut self.subsystems)?;
         }
         Ok(outcome)
     }

@@ -545,6 +545,11 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn set(&mut self, ids: &[u32], values: Values) -> Result {
+        if self.open && self.can_go_back {
+            // a value that is set before a step is repeated belongs to the state at its start
+            self.instance.restore(&self.before).map_err(error)?;
+            self.open = false;
+        }
         match (values, self.single(ids)) {
             (Values::F64(values), Some(place)) if self.takes(place) && !place.clocked => {
                 self.instance.set_f64(&[place.reference], values).map_err(error)

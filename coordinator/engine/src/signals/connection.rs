@@ -242,6 +242,11 @@ impl Link {
         self.order == ConnectionOrder::Iterate
     }
 
+    /// Whether its inputs follow a line through the values of the source.
+    pub fn follows_line(&self) -> bool {
+        self.extrapolation.is_some()
+    }
+
     /// Number of values.
     #[inline]
     pub fn count(&self) -> usize {
@@ -279,7 +284,7 @@ impl Links {
 
     /// Settles which inputs take the value at the end of a step, where they follow a line.
     pub fn settle_ends(&mut self, of: &FeedThroughs) {
-        let extrapolated = self.numbers.iter_mut().filter(|link| link.extrapolation.is_some());
+        let extrapolated = self.numbers.iter_mut().filter(|link| link.follows_line());
         extrapolated.for_each(|link| link.settle_ends(of));
     }
 

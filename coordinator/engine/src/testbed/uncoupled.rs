@@ -83,6 +83,11 @@ impl Uncoupled {
         Ok(discarded)
     }
 
+    /// Forgets the trials of a step that glue did not converge in.
+    pub fn discard(&self, subsystems: &mut Subsystems) -> Result {
+        self.loops.back(&mut subsystems.instances)
+    }
+
     /// Trials of those that take outputs of others at the end of the step, level by level.
     fn advance_levels(
         &mut self,

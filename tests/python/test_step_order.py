@@ -121,21 +121,70 @@ def test_a_loop_whose_values_run_away_is_not_solved(tmp_path):
     assert done.returncode == 1 and "the loop of a, b was not solved" in done.stderr
 
 
-def iterated(parts, folder, step):
+def iterated(parts, folder, step, order="iterate", more=""):
     """Energies over 2 s, and the largest error of the position relative to the amplitude, with the loop of mass and spring solved in
     each step."""
-    rows = sprung(parts, folder, step, 'order = "iterate"', 'order = "iterate"')
+    rows = sprung(parts, folder, step, f'order = "{order}"', f'order = "{order}"', more=more)
     return [0.5 * float(r["mass.v"]) ** 2 + 50 * float(r["mass.x"]) ** 2 for r in rows], farthest(rows)
 
 
-def test_a_loop_that_is_iterated_keeps_the_energy_and_is_of_second_order(parts, tmp_path):
-    energies, error = iterated(parts, tmp_path, 0.01)
-    # the mean of the force at both ends does the work of the spring exactly, so the amplitude stays
+@pytest.mark.parametrize("order, halving", [("iterate", 16), ("iterate-ends", 4)])
+def test_a_loop_that_is_iterated_keeps_the_energy_and_has_its_order(parts, tmp_path, order, halving):
+    energies, error = iterated(parts, tmp_path, 0.01, order)
+    # start and end of a step are treated alike, so the amplitude stays
     assert max(energies) - min(energies) < 1e-9 * energies[0]
-    finer = iterated(parts, tmp_path, 0.005)[1]
-    assert error / finer == pytest.approx(4, abs=0.1)
-    notes = json.loads((tmp_path / "out/exchange.json").read_text())["connections"]
-    assert all(n["delay"] == "0" and "repeat" in n["why"] for n in notes)
+    finer = iterated(parts, tmp_path, 0.005, order)[1]
+    assert error / finer == pytest.approx(halving, rel=0.03)
+    notes = json.loads((tmp_path / "out/exchange.json").read_text())
+    assert all(n["delay"] == "0" and "repeat" in n["why"] for n in notes["connections"])
+    assert ("in the middle of the step, too" in notes["loops"][0]) == (order == "iterate")
+
+
+def test_workers_solve_a_loop_with_the_same_bits(parts, tmp_path):
+    assert iterated(parts, tmp_path, 0.01) == iterated(parts, tmp_path, 0.01, more="isolate = true\n")
+
+
+def test_stiff_loops_stay_bounded(tmp_path):
+    # 2 pi / 628 = 10 ms is the period of the spring; steps are ten times as long
+    build(tmp_path, "mass", MASS, "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(tmp_path, "spring", [("x", "input", 0.1, ""), ("f", "output", -4e4, "")], "r[1] = -4e5 * r[0];", depends="1")
+    for order in ("iterate", "iterate-ends"):
+        rows = sprung(tmp_path, tmp_path, 0.1, f'order = "{order}"', f'order = "{order}"')
+        assert max(abs(float(r["mass.x"])) for r in rows) < 0.11
+
+
+@pytest.mark.parametrize("how", ["own_solver_step", "one_length"])
+def test_a_loop_whose_fmu_makes_no_half_steps_exchanges_values_at_the_ends(parts, tmp_path, how):
+    # with a solver step of 10 ms nothing moves until that is over
+    own = "if (h < 0.0099) { r[3] += h; if (r[3] < 0.0099) return 0; h = r[3]; r[3] = 0; } "
+    step = "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];"
+    reals = MASS + [("rest", "local", 0.0, "")]
+    build(tmp_path, "mass", reals, (own if how == "own_solver_step" else "") + step, depends="", variable_step=how != "one_length")
+    (tmp_path / "spring.fmu").write_bytes((parts / "spring.fmu").read_bytes())
+    energies, error = iterated(tmp_path, tmp_path, 0.01)
+    notes = json.loads((tmp_path / "out/exchange.json").read_text())
+    assert ("at its end only, as `mass` makes steps of one length" in notes["loops"][0]) == (how == "one_length")
+    at_ends = iterated(tmp_path, tmp_path, 0.01, "iterate-ends")
+    # of two ways to the same solution
+    assert energies == pytest.approx(at_ends[0], abs=1e-10) and error == pytest.approx(at_ends[1], abs=1e-8)
+
+
+def test_loops_and_chains_beside_each_other_do_not_disturb_each_other(parts, tmp_path):
+    alone = {order: sprung(parts, tmp_path, 0.01, f'order = "{order}"', f'order = "{order}"') for order in ("iterate", "iterate-ends")}
+    build(tmp_path, "clock", [("y", "output", 0.0, "")], "r[0] = t + h;", depends="")
+    build(tmp_path, "sum", [("u", "input", 0.0, ""), ("x", "output", 0.0, ""), ("y", "output", 0.0, "")], "r[1] += h * r[0]; r[2] = r[0];", depends={"y": "1", "x": ""})
+    text = "[time]\nstep_s = 0.01\nduration_s = 2.0\n[clock]\nfmu = \"clock.fmu\"\n[sum]\nfmu = \"sum.fmu\"\n[[connect]]\nfrom = \"clock.y\"\nto = \"sum.u\"\n"
+    for k, order in enumerate(("iterate-ends", "iterate")):
+        text += f'[mass_{k}]\nfmu = "{parts}/mass.fmu"\n[spring_{k}]\nfmu = "{parts}/spring.fmu"\n'
+        text += f'[[connect]]\nfrom = "mass_{k}.x"\nto = "spring_{k}.x"\norder = "{order}"\n[[connect]]\nfrom = "spring_{k}.f"\nto = "mass_{k}.f"\norder = "{order}"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out/variables.csv").open()))
+    for k, order in enumerate(("iterate-ends", "iterate")):
+        assert [r[f"mass_{k}.x"] for r in rows] == [r["mass.x"] for r in alone[order]]
+    # sum of t h at the ends of 200 steps
+    assert float(rows[-1]["sum.x"]) == pytest.approx(1e-4 * 200 * 201 / 2, abs=1e-12)
 
 
 def test_an_algebraic_loop_is_solved(tmp_path):

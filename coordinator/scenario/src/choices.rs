@@ -103,8 +103,17 @@ named! {
         Structure = "structure",
         /// At the start of the step.
         Jacobi = "jacobi",
-        /// The step is repeated until the value at its end is the one that it was made with.
+        /// The step is repeated until its values, in the middle and at the end, are those that it was made with.
         Iterate = "iterate",
+        /// The step is repeated until the value at its end is the one that it was made with.
+        IterateEnds = "iterate-ends",
+    }
+}
+
+impl ConnectionOrder {
+    /// Whether the step is repeated until its values are those that it was made with.
+    pub fn repeats(self) -> bool {
+        matches!(self, Self::Iterate | Self::IterateEnds)
     }
 }
 

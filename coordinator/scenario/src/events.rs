@@ -27,9 +27,9 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
         }
         let extrapolate = Extrapolate::named(&s.text("extrapolate")).unwrap_or(Extrapolate::Constant);
         let order = ConnectionOrder::named(&s.text("order")).unwrap_or(ConnectionOrder::Structure);
-        if extrapolate != Extrapolate::Constant && order == ConnectionOrder::Iterate {
+        if extrapolate != Extrapolate::Constant && order.repeats() {
             let message = format!(
-                "`extrapolate = \"{extrapolate}\"` beside `order = \"iterate\"`, which finds the values of the step itself"
+                "`extrapolate = \"{extrapolate}\"` beside `order = \"{order}\"`, which finds the values of the step itself"
             );
             return Err(s.error("extrapolate", message, Some("leave one of them out".into())));
         }

@@ -239,7 +239,12 @@ impl Link {
 
     /// Whether the step is repeated until its values stand.
     pub fn is_iterated(&self) -> bool {
-        self.order == ConnectionOrder::Iterate
+        self.order.repeats()
+    }
+
+    /// Whether that value is exchanged at the end of the step alone.
+    pub fn is_iterated_at_ends(&self) -> bool {
+        self.order == ConnectionOrder::IterateEnds
     }
 
     /// Whether its inputs follow a line through the values of the source.
@@ -456,7 +461,7 @@ impl Resolving<'_> {
         from: VariableRef,
     ) -> std::result::Result<(), Box<InputError>> {
         let value_type = from.describe(self.instances).value_type;
-        if connection.order != ConnectionOrder::Iterate || value_type == ValueType::F64 {
+        if !connection.order.repeats() || value_type == ValueType::F64 {
             return Ok(());
         }
         let own = format!("{value_type:?}").to_lowercase();
@@ -473,7 +478,7 @@ impl Resolving<'_> {
         for (number, name) in directory.streams().iter().enumerate() {
             let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) else { continue };
             matched = true;
-            if connection.order == ConnectionOrder::Iterate {
+            if connection.order.repeats() {
                 let message = format!("`{name}` is a stream: only numbers of 64 bits can be iterated");
                 let help = "leave `order = \"iterate\"` of this connection out: messages are late by a step";
                 return Err(self.refuse(connection, "order", message, Some(help.into())));

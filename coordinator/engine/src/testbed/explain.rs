@@ -208,7 +208,8 @@ impl Explained<'_> {
         let (delay, why) = match (end.passes, self.schedules[end.from.0].step_multiple) {
             (Passes::Repeatedly, _) => (
                 "0".to_owned(),
-                "source and target repeat the step until the value at its end is the one that it was made with".to_owned(),
+                "source and target repeat the step until its values are those that it was made with"
+                    .to_owned(),
             ),
             (Passes::AtEnd, _) => (
                 "0".to_owned(),
@@ -216,11 +217,13 @@ impl Explained<'_> {
             ),
             (Passes::AlongLine, n) => (
                 n.to_string(),
-                "read at the start of a step; the input follows the line through the last two values".to_owned(),
+                "read at the start of a step; the input follows the line through the last two values"
+                    .to_owned(),
             ),
             (Passes::AlongDerivative, n) => (
                 n.to_string(),
-                "read at the start of a step; the input follows the derivative that its source provides".to_owned(),
+                "read at the start of a step; the input follows the derivative that its source provides"
+                    .to_owned(),
             ),
             (Passes::AtStart, 1) => {
                 ("1".to_owned(), "read at the start of a step and held to its end".to_owned())

@@ -1,14 +1,15 @@
 //! Loops of connections that are solved within a step (`order = "iterate"`): FMUs repeat the step until the outputs at its end are
 //! those that it was made with.
 //!
-//! An input that outputs of the loop follow at once takes the value at the end of the step; any other one takes the mean of the values
-//! at start and end, which makes the step of second order. Each repetition begins with the state at the start of the step.
+//! Where all FMUs of a loop can, and inputs of it are integrated, each repetition is made of two halves, with the outputs in the middle as further
+//! values: of fourth order. Else it is one step: an input that outputs of the loop follow at once takes the value at its end, any other one the
+//! mean of the values at start and end, which is of second order. Each repetition begins with the state at the start of the step.
 //! FMUs that only take values of a loop are stepped when it is solved.
 //!
 //! The next values are those that Anderson's combination (1965) makes of the last six, of Newton's steps where all FMUs of the loop have
 //! directional derivatives, else of the residuals: loops whose gains are above one are solved, too.
 
-use super::loop_values::LoopValues;
+use super::loop_values::{LoopValues, Part};
 use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
@@ -19,7 +20,7 @@ use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_scenario::ModuleKind;
-use terraglue_subsystem::{Capabilities, Response};
+use terraglue_subsystem::{Capabilities, Motion, Response};
 
 /// Most repetitions of a step.
 const MOST: u32 = 60;
@@ -75,7 +76,7 @@ impl Loops {
         }
         for (number, numbers) in iterated {
             let own = loops.members.iter().copied().filter(|slot| component[*slot] == number).collect();
-            loops.loops.push(LoopValues::new(numbers, links, feed_through, own));
+            loops.loops.push(LoopValues::new(numbers, links, feed_through, instances, own));
         }
         Ok(loops)
     }
@@ -142,20 +143,71 @@ impl Loops {
                 break;
             }
             repetitions += 1;
-            self.back(&mut subsystems.instances)?;
-            self.loops.iter().try_for_each(|own| own.set(links, &mut subsystems.instances))?;
-            for level in 0..order.levels_before_loops() {
-                span.level = level as u32;
-                order.pass_on(level, links, &mut subsystems.instances)?;
-                let mut out =
-                    Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: 0.0, flags: 0 };
-                for slot in &self.members {
-                    let instance = &mut subsystems.instances[*slot];
-                    subsystems.schedules[*slot].try_alone(instance, span, &mut out);
-                }
-            }
+            self.repeat(order, span, links, subsystems)?;
         }
         Ok(Some(self.unsolved(repetitions, span, links, &subsystems.instances)))
+    }
+
+    /// One trial of the members from the start of the step, with the inputs that the guess makes.
+    fn repeat(
+        &mut self,
+        order: &StepOrder,
+        span: &mut Span,
+        links: &mut Links,
+        subsystems: &mut Subsystems,
+    ) -> Result {
+        self.back(&mut subsystems.instances)?;
+        let halving = |loops: &[LoopValues], slot: usize| {
+            loops.iter().any(|own| own.goes_by_halves() && own.members().contains(&slot))
+        };
+        let (by_halves, whole): (Vec<usize>, Vec<usize>) =
+            self.members.iter().partition(|slot| halving(&self.loops, **slot));
+        if !whole.is_empty() {
+            self.try_part(Part::Whole, &whole, order, span, links, subsystems)?;
+        }
+        if by_halves.is_empty() {
+            return Ok(());
+        }
+        let mut first = span.half(false);
+        self.try_part(Part::FirstHalf, &by_halves, order, &mut first, links, subsystems)?;
+        if first.broken.load(Ordering::Relaxed) {
+            span.broken.store(true, Ordering::Relaxed);
+            return Ok(());
+        }
+        for own in self.loops.iter_mut().filter(|own| own.goes_by_halves()) {
+            own.take_middle(links, &subsystems.instances)?;
+        }
+        let still = Motion { x: &[], v: &[] };
+        by_halves.iter().try_for_each(|slot| subsystems.instances[*slot].commit(&first.step, &[], &still))?;
+        let mut second = span.half(true);
+        self.try_part(Part::SecondHalf, &by_halves, order, &mut second, links, subsystems)?;
+        span.broken.fetch_or(second.broken.into_inner(), Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// A part of the trial, of those members that make it so, level by level.
+    fn try_part(
+        &self,
+        part: Part,
+        members: &[usize],
+        order: &StepOrder,
+        span: &mut Span,
+        links: &mut Links,
+        subsystems: &mut Subsystems,
+    ) -> Result {
+        let halves = part != Part::Whole;
+        let own = self.loops.iter().filter(|own| own.goes_by_halves() == halves);
+        own.into_iter().try_for_each(|own| own.set(part, links, &mut subsystems.instances))?;
+        for level in 0..order.levels_before_loops() {
+            span.level = level as u32;
+            order.pass_on(level, |slot| members.contains(&slot), links, &mut subsystems.instances)?;
+            let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: 0.0, flags: 0 };
+            for slot in members {
+                let instance = &mut subsystems.instances[*slot];
+                subsystems.schedules[*slot].try_alone(instance, span, &mut out);
+            }
+        }
+        Ok(())
     }
 
     /// A loop that was not solved: its FMUs, its connections, and how far a value is off.

@@ -21,6 +21,8 @@ const MOST: usize = 300;
 pub(super) struct Newton {
     /// Iterated connections first, then those that pass their values on at once.
     links: Vec<usize>,
+    /// Values of the iterated ones.
+    iterated: usize,
     /// D, column by column.
     columns: Vec<f64>,
     lu: Lu,
@@ -33,13 +35,14 @@ impl Newton {
     /// For these iterated connections, and others among the same subsystems.
     pub fn new(iterated: impl Iterator<Item = usize>, links: &Links, members: &[usize]) -> Self {
         let mut own: Vec<usize> = iterated.collect();
+        let values = |own: &[usize]| own.iter().map(|k| links.numbers[*k].count()).sum::<usize>();
+        let iterated = values(&own);
         let among = |link: &Link| link.slots().iter().all(|slot| members.contains(slot));
         let others = links.numbers.iter().enumerate().filter(|(_, l)| l.is_within_the_step() && among(l));
         let others: Vec<usize> = others.map(|(k, _)| k).filter(|k| !own.contains(k)).collect();
         own.extend(others);
-        let offered =
-            !own.is_empty() && (own.iter().map(|k| links.numbers[*k].count()).sum::<usize>()) <= MOST;
-        Self { offered, links: own, ..Self::default() }
+        let offered = !own.is_empty() && values(&own) <= MOST;
+        Self { offered, links: own, iterated, ..Self::default() }
     }
 
     /// How it helps a loop of some members, in words.
@@ -53,7 +56,8 @@ impl Newton {
         }
     }
 
-    /// Turns the residual of the iterated connections into the step of Newton; leaves it as it is where derivatives are missing.
+    /// Turns the residual of the iterated connections, at the end of the step and, where it is as long again, in the middle, into the step of Newton;
+    /// leaves it as it is where derivatives are missing.
     ///
     /// # Errors
     /// [`Error::Module`](terraglue_diagnostics::Error::Module): a subsystem fails.
@@ -61,11 +65,13 @@ impl Newton {
         if !(self.offered && self.factor(links, instances)?) {
             return Ok(());
         }
-        self.step.clear();
-        self.step.extend_from_slice(residual);
-        self.step.resize(self.columns.len().isqrt(), 0.0);
-        self.lu.solve(&mut self.step);
-        residual.copy_from_slice(&self.step[..residual.len()]);
+        for part in residual.chunks_exact_mut(self.iterated) {
+            self.step.clear();
+            self.step.extend_from_slice(part);
+            self.step.resize(self.columns.len().isqrt(), 0.0);
+            self.lu.solve(&mut self.step);
+            part.copy_from_slice(&self.step[..part.len()]);
+        }
         Ok(())
     }
 

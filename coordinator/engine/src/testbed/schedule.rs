@@ -17,6 +17,16 @@ pub(super) struct Span {
     pub broken: AtomicBool,
 }
 
+impl Span {
+    /// A half of it.
+    pub fn half(&self, second: bool) -> Self {
+        let Self { step, end, nominal, step_s, level, .. } = *self;
+        let h = 0.5 * step.h;
+        let step = Step::free(if second { step.t + h } else { step.t }, h, step.index);
+        Self { step, end, nominal, step_s, level, broken: AtomicBool::new(false) }
+    }
+}
+
 /// When a subsystem makes a step by itself, and how it ended. Apart from all else of a subsystem, as every step asks for it.
 pub(super) struct StepSchedule {
     /// Steps of the testbed per step of this subsystem.

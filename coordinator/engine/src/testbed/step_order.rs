@@ -98,16 +98,28 @@ impl StepOrder {
         self.levels.len().max(1)
     }
 
-    /// Passes the outputs at the end of the step to the subsystems of a level.
-    pub fn pass_on(&self, level: usize, links: &mut Links, instances: &mut [Instance]) -> Result {
+    /// Passes the outputs at the end of the step to those subsystems of a level that are stepped then.
+    pub fn pass_on(
+        &self,
+        level: usize,
+        to: impl Fn(usize) -> bool,
+        links: &mut Links,
+        instances: &mut [Instance],
+    ) -> Result {
         let Some(passed) = self.levels.get(level) else { return Ok(()) };
         for k in &passed.numbers {
-            links.numbers[*k].read(instances)?;
-            links.numbers[*k].pass_on(instances)?;
+            let link = &mut links.numbers[*k];
+            if to(link.slots()[1]) {
+                link.read(instances)?;
+                link.pass_on(instances)?;
+            }
         }
         for k in &passed.discrete {
-            links.discrete[*k].read(instances)?;
-            links.discrete[*k].pass_on(instances)?;
+            let link = &mut links.discrete[*k];
+            if to(link.ends()[1].slot()) {
+                link.read(instances)?;
+                link.pass_on(instances)?;
+            }
         }
         Ok(())
     }

@@ -102,7 +102,7 @@ impl Uncoupled {
                 break;
             }
             span.level = level as u32;
-            self.order.pass_on(level, links, &mut subsystems.instances)?;
+            self.order.pass_on(level, |_| true, links, &mut subsystems.instances)?;
             if is_sampled(clock) {
                 self.sample(span, subsystems);
             } else {

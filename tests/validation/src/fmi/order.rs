@@ -29,6 +29,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     let structure = off(&oscillate(folder, "simple", 0.01, ["", ""])?);
     let late = off(&oscillate(folder, "simple", 0.01, [JACOBI, JACOBI])?);
     let iterated = oscillate(folder, "mass", 0.01, [ITERATE, ITERATE])?;
+    let ends = off(&oscillate(folder, "mass", 0.01, [ENDS, ENDS])?);
     let line = off(&oscillate(folder, "mass", 0.01, ["", LINE])?);
     let percent = |share: f64| 100.0 * share;
     let what = |how: &str| {
@@ -56,6 +57,13 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             "mass and spring as two FMUs, 10 ms, the loop iterated: amplitude after 2 s against the one of the start, %",
         ),
     ];
+    all.push(Figure::new(
+        "fmi.order.iterate_ends",
+        percent(ends),
+        Limit::None,
+        what("the loop iterated, values at the ends of steps alone"),
+    ));
+    all.extend(pushed(folder)?);
     all.push(beside(folder)?);
     all.extend(newton(folder)?);
     Ok(all)
@@ -63,6 +71,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
 
 const JACOBI: &str = "order = \"jacobi\"\n";
 const ITERATE: &str = "order = \"iterate\"\n";
+const ENDS: &str = "order = \"iterate-ends\"\n";
 const LINE: &str = "extrapolate = \"linear\"\n";
 
 /// The mass at the end of a run.
@@ -100,6 +109,37 @@ fn oscillate_with(folder: &Path, mass: &str, step_s: f64, how: [&str; 2], more: 
     Ok(MassEnd { x, amplitude: (x * x + v * v / K).sqrt() })
 }
 
+/// Order of the error of a mass that starts with a speed, from steps of 40 ms to steps of 20 ms.
+fn pushed(folder: &Path) -> Outcome<Vec<Figure>> {
+    const V0: f64 = 0.3;
+    let mass = [("f", 'i', -K * X0), ("x", 's', X0), ("v", 's', V0)];
+    let step = "v[1] += h * v[2] + 0.5 * h * h * v[0]; v[2] += h * v[0];";
+    fmus::build(folder, "pushed", &mass, "", step)?;
+    let exact = X0 * (K.sqrt() * END).cos() + V0 / K.sqrt() * (K.sqrt() * END).sin();
+    let error =
+        |step_s: f64, how| oscillate(folder, "pushed", step_s, [how, how]).map(|end| (end.x - exact).abs());
+    let order = |how| -> Outcome<f64> { Ok((error(0.04, how)? / error(0.02, how)?).log2()) };
+    let what = |how| {
+        format!(
+            "mass with a speed at the start, and its spring, as two FMUs: order of the error of the place after 2 s, {how}"
+        )
+    };
+    Ok(vec![
+        Figure::new(
+            "fmi.order.iterate.order",
+            order(ITERATE)?,
+            Limit::AtLeast(3.8),
+            what("the loop iterated"),
+        ),
+        Figure::new(
+            "fmi.order.iterate_ends.order",
+            order(ENDS)?,
+            Limit::AtLeast(1.9),
+            what("with values at the ends of steps alone"),
+        ),
+    ])
+}
+
 /// A mass that also tells its acceleration, which follows the force at once, to a display: the largest change of place and speed by that.
 fn beside(folder: &Path) -> Outcome<Figure> {
     let mass = [("f", 'i', -K * X0), ("x", 's', X0), ("v", 's', 0.0), ("a", 'o', -K * X0)];
@@ -107,7 +147,7 @@ fn beside(folder: &Path) -> Outcome<Figure> {
     fmus::build(folder, "mass_with_acceleration", &mass, "v[3] = v[0];", step)?;
     fmus::build(folder, "display", &[("u", 'i', 0.0), ("y", 'o', 0.0)], "v[1] = v[0];", "")?;
     let mut worst = 0.0;
-    for how in [["", ""], [JACOBI, JACOBI], [ITERATE, ITERATE], ["", LINE]] {
+    for how in [["", ""], [JACOBI, JACOBI], [ITERATE, ITERATE], [ENDS, ENDS], ["", LINE]] {
         let alone = oscillate(folder, "mass", 0.01, how)?;
         let display =
             "[display]\nfmu = \"display.fmu\"\n[[connect]]\nfrom = \"mass.a\"\nto = \"display.u\"\n";

@@ -271,7 +271,7 @@ def error_over_cost():
         "drive": "drive, rad/s",
         "two_mass_held": "two masses, input held, m",
     }
-    keys = {name: f'`order = "{name}"`' for name in ("jacobi", "structure", "iterate")}
+    keys = {name: f'`order = "{name}"`' for name in ("jacobi", "structure", "iterate", "iterate-ends")}
     keys |= {name: f'`extrapolate = "{name}"`' for name in ("linear", "derivatives")}
     steps = ["20ms", "10ms", "5ms"]
     heads = ["case", "key", *(step.replace("ms", " ms") for step in steps), "order of the error"]

@@ -171,7 +171,7 @@ CLAIMS = [
     Claim(SOIL, "the same braked, sinkage and force | {} %, {} %", (figure(PLATE_WHEEL + "braked.sinkage"), figure(PLATE_WHEEL + "braked.force"))),
     Claim(SOIL, "side slip, sinkage and side force | {} %, {} %", (figure(PLATE_WHEEL + "aside.sinkage"), figure(PLATE_WHEEL + "aside.force"))),
 
-    Claim("docs/fmi.md", "the amplitude of the two masses is wrong by {} % with `linear`, by {} % with `derivatives`",
+    Claim("docs/fmi.md", "of the two masses has grown by {} % with `linear`, by {} % with `derivatives`",
           tuple(figure(f"fmi.error_over_cost.two_mass_100s.{key}") for key in ("linear", "derivatives"))),
     Claim("docs/fmi.md", "--part behaviour` has {} runs of FMUs that misbehave",
           (cases(*(f"fmi.behaviour.{where}" for where in ("isolated", "same_process", "alone.isolated", "alone.same_process"))),)),

@@ -3,18 +3,24 @@
 use crate::scene::plants;
 use crate::stand::{Growth, Stand, Terrain as Formula};
 use crate::survey::Survey;
+use crate::table::{self, Listed};
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::Arc;
+use terraglue_numerics::random::Random;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Causality, Config, Energy, Error, Host, Input, Kind, Message, Module, Motion,
-    Parameter, ParameterType, Response, Result, Scene, Schema, Slots, Step, StreamInfo, Subsystem, Terrain,
-    ValueType, ValuesMut, Variable, bytes, persist,
+    BodyState, Capabilities, Causality, Config, Energy, Error, Host, Input, Kind, LogLevel, Message, Module,
+    Motion, Parameter, ParameterType, Response, Result, Scene, Schema, Slots, Step, StreamInfo, Subsystem,
+    Terrain, ValueType, ValuesMut, Variable, bytes, files, persist,
 };
 
 /// Form of the serialized state.
 const VERSION: u32 = 2;
 /// Id of the number of trees.
 const TREES: u32 = 0;
+/// Help of the parameter `trees`.
+const TABLE_HELP: &str = "Table (CSV) of surveyed trees, which stand as it says, instead of those that grow: columns x, y and, where they are \
+                          known, dbh_m, height_m, species (pine or spruce), lean_x, lean_y";
 /// Most plants of a stand.
 const MOST_PLANTS: f64 = 20_000.0;
 
@@ -46,6 +52,13 @@ pub fn schema() -> Schema {
         Parameter::number(name, unit, default, help).within(0.0, f64::INFINITY)
     };
     let parameters = vec![
+        Parameter::of("trees", ParameterType::Path, TABLE_HELP).optional(),
+        Parameter::of(
+            "trees_origin_m",
+            ParameterType::Numbers,
+            "Place of the origin in the coordinates of that table, x and y",
+        )
+        .or(vec![0.0, 0.0]),
         Parameter::number("seed", "", 1.0, "Seed of the stand, apart from that of the run").within(0.0, 1e15),
         part("per_hectare", "", usual.per_hectare, "Trees per hectare"),
         Parameter::number("half_m", "m", usual.half_m, "Half the edge of the square in which they stand")
@@ -63,6 +76,13 @@ pub fn schema() -> Schema {
         Parameter::number("spruces", "", usual.spruces, "Share of spruces; the others are pines")
             .within(0.0, 1.0),
         part("bushes_per_hectare", "", usual.bushes_per_hectare, "Bushes per hectare"),
+        Parameter::number(
+            "crown_transmittance",
+            "",
+            0.0,
+            "Share of the light that passes each surface of crowns and bushes",
+        )
+        .within(0.0, 1.0),
         part("clearing_m", "m", usual.clearing_m, "No plant stands nearer to the origin"),
         Parameter::of(
             "road_m",
@@ -82,7 +102,8 @@ pub fn schema() -> Schema {
         )
         .within(0.0, 10.0),
     ];
-    let help = "A stand of trees from a seed, with branches and undergrowth, to be seen by sensors";
+    let help =
+        "A stand of trees from a table or a seed, with branches and undergrowth, to be seen by sensors";
     Schema { name: "forest".into(), kind: Kind::Robot, help: help.into(), parameters }
 }
 
@@ -124,13 +145,24 @@ impl Forest {
             return Err(Error::Refused(why));
         }
         let seed = of("seed")? as u64;
-        let mut stand = Stand::grow(&growth, seed);
-        stand.clear_road(&corners(&config.numbers("road_m")?)?, of("road_half_m")?);
+        let (road, half_m) = (corners(&config.numbers("road_m")?)?, of("road_half_m")?);
+        let mut stand = match config.text("trees") {
+            Ok(path) => {
+                let mut stand = surveyed(config, path, (&growth, seed), host)?;
+                stand.clear_road_of_bushes(&road, half_m);
+                stand
+            }
+            Err(_) => {
+                let mut stand = Stand::grow(&growth, seed);
+                stand.clear_road(&road, half_m);
+                stand
+            }
+        };
         let height = |at: [f64; 2]| host.terrain().map_or(0.0, |t| height(t, at));
         let feet =
             stand.trees.iter_mut().map(|t| &mut t.foot).chain(stand.bushes.iter_mut().map(|b| &mut b.foot));
         feet.for_each(|foot| foot[2] = height([foot[0], foot[1]]));
-        let scene = plants(&stand, seed).as_one_body("stand");
+        let scene = plants(&stand, seed, of("crown_transmittance")?).as_one_body("stand");
         let trees = Variable::real(TREES, "trees", "", Causality::Output, "Trees of the stand");
         let survey =
             Survey { noise_m: of("map_noise_m")?, missing: of("map_missing")?, extra: of("map_extra")? };
@@ -158,6 +190,37 @@ impl Forest {
     pub fn stand(&self) -> &Stand {
         &self.stand
     }
+}
+
+/// The stand of a table, with bushes from the seed.
+fn surveyed(config: &Config, path: &str, (growth, seed): (&Growth, u64), host: &dyn Host) -> Result<Stand> {
+    let path = Path::new(host.folder()).join(path);
+    let shown = path.display();
+    let text = files::read_large_text(&path).map_err(|e| Error::Failed(format!("{shown}: {e}")))?;
+    let origin = match config.numbers("trees_origin_m")?[..] {
+        [x, y] if x.is_finite() && y.is_finite() => [x, y],
+        _ => {
+            return Err(Error::Refused("parameter `trees_origin_m`: x and y are needed, both finite".into()));
+        }
+    };
+    let mut random = Random::new(seed);
+    let draw = |random: &mut Random| (growth.diameter(random), growth.species(random));
+    let Listed { mut stand, unread } = table::listed(&text, origin, draw, &mut random)
+        .map_err(|why| Error::Refused(format!("{shown}: {why}")))?;
+    if stand.trees.len() as f64 > MOST_PLANTS {
+        let why = format!("{shown}: {} trees are more than {MOST_PLANTS:.0}", stand.trees.len());
+        return Err(Error::Refused(why));
+    }
+    if !unread.is_empty() {
+        let text = format!(
+            "{shown}: columns that are not read: {}; those that are: {}",
+            unread.join(", "),
+            table::COLUMNS.join(", ")
+        );
+        host.log(LogLevel::Warning, &text);
+    }
+    stand.grow_bushes(growth, &mut random);
+    Ok(stand)
 }
 
 /// Corners of a road of a list of x and y.

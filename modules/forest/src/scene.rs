@@ -10,12 +10,14 @@ use terraglue_subsystem::{
 };
 
 /// A stand as a scene.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Plants {
     /// One body for each tree, in their order, then one for each bush.
     pub scene: Scene,
     /// Where they stand.
     pub states: Vec<BodyState>,
+    /// Material of branches and leaves.
+    leaves: Material,
 }
 
 /// How far stems go into the ground, m.
@@ -25,9 +27,16 @@ const CUTS: [f64; 6] = [0.08, 0.2, 0.4, 0.6, 0.8, 1.0];
 /// Leaves of a bush.
 const LEAVES: u32 = 120;
 
-/// The shapes of a stand: stems as six cones without tips, branches and leaves as triangles drawn from a seed.
-pub fn plants(stand: &Stand, seed: u64) -> Plants {
-    let mut plants = Plants::default();
+/// The shapes of a stand: stems as six cones without tips, branches and leaves as triangles drawn from a seed, through which a share of the
+/// light passes. Half of the rest comes back.
+pub fn plants(stand: &Stand, seed: u64, transmittance: f64) -> Plants {
+    let class = MaterialClass::FOLIAGE.0;
+    let leaves = Material {
+        class,
+        reflectance: (0.5 * (1.0 - transmittance)) as f32,
+        transmittance: transmittance as f32,
+    };
+    let mut plants = Plants { scene: Scene::default(), states: Vec::new(), leaves };
     let mut random = Random::new(seed);
     for (number, tree) in stand.trees.iter().enumerate() {
         // the stem is upright in the frame of its body, which leans
@@ -78,7 +87,7 @@ impl Plants {
         self.states.push(BodyState { world_from_body, ..BodyState::REST });
     }
 
-    fn shape(&mut self, geometry: Geometry, z: f64, class: MaterialClass) {
+    fn shape(&mut self, geometry: Geometry, z: f64, material: Material) {
         let id = self.scene.shapes.len() as u32;
         self.scene.shapes.push(SceneShape {
             id,
@@ -87,7 +96,7 @@ impl Plants {
             geometry,
             body_from_shape: Pose { position: [0.0, 0.0, z], ..Pose::IDENTITY },
             collides: false,
-            material: Material::of(class, 0.5),
+            material,
         });
     }
 
@@ -99,7 +108,7 @@ impl Plants {
                 radius_bottom: tree.radius_at(low),
                 radius_top: tree.radius_at(high),
             };
-            self.shape(frustum, 0.5 * (low + high), MaterialClass::WOOD);
+            self.shape(frustum, 0.5 * (low + high), Material::of(MaterialClass::WOOD, 0.5));
             low = high;
         }
     }
@@ -135,7 +144,7 @@ impl Plants {
         let count = corners.len() as u32;
         let triangles = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let points = corners.as_flattened().to_vec();
-        self.shape(Geometry::Mesh { points, triangles }, 0.0, MaterialClass::FOLIAGE);
+        self.shape(Geometry::Mesh { points, triangles }, 0.0, self.leaves);
     }
 }
 

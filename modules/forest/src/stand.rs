@@ -63,6 +63,25 @@ impl Default for Growth {
     }
 }
 
+impl Growth {
+    /// Plants in the square at so many per hectare.
+    fn count(&self, per_hectare: f64) -> usize {
+        let hectares = 4e-4 * self.half_m * self.half_m;
+        (per_hectare * hectares).round().clamp(0.0, 1e6) as usize
+    }
+
+    /// A diameter, m, of the Weibull distribution, by the inverse of its distribution function.
+    pub fn diameter(&self, random: &mut Random) -> f64 {
+        let drawn = libm::pow(-libm::log(random.uniform()), 1.0 / self.shape);
+        (self.diameter_m * drawn).max(THINNEST)
+    }
+
+    /// A species by its share.
+    pub fn species(&self, random: &mut Random) -> Species {
+        if random.uniform() < self.spruces { Species::Spruce } else { Species::Pine }
+    }
+}
+
 /// A bush, which is no tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bush {
@@ -92,30 +111,41 @@ impl Stand {
     /// T. R. Dell, "Quantifying diameter distributions with the Weibull function", 1973). Trees that find no place are omitted.
     pub fn grow(growth: &Growth, seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let hectares = 4e-4 * growth.half_m * growth.half_m;
         let mut stand = Self::default();
-        let count = |per_hectare: f64| (per_hectare * hectares).round().clamp(0.0, 1e6) as usize;
         let mut taken: Vec<[f64; 2]> = Vec::new();
-        for _ in 0..count(growth.per_hectare) {
+        for _ in 0..growth.count(growth.per_hectare) {
             let Some(at) = place(growth, &taken, growth.apart_m, &mut random) else { continue };
             taken.push(at);
             stand.trees.push(tree(growth, at, &mut random));
         }
-        for _ in 0..count(growth.bushes_per_hectare) {
-            let Some(at) = place(growth, &[], 0.0, &mut random) else { continue };
-            let foot = [at[0], at[1], growth.terrain.height(at)];
-            stand.bushes.push(Bush { foot, radius: random.between(0.3, 0.9) });
-        }
+        stand.grow_bushes(growth, &mut random);
         stand
+    }
+
+    /// Bushes beside trees that are there already, grown as those of [`Stand::grow`].
+    pub fn grow_bushes(&mut self, growth: &Growth, random: &mut Random) {
+        for _ in 0..growth.count(growth.bushes_per_hectare) {
+            let Some(at) = place(growth, &[], 0.0, random) else { continue };
+            let foot = [at[0], at[1], growth.terrain.height(at)];
+            self.bushes.push(Bush { foot, radius: random.between(0.3, 0.9) });
+        }
     }
 
     /// Takes away all plants within `half_m` of a road through these corners, m.
     pub fn clear_road(&mut self, road: &[[f64; 2]], half_m: f64) {
-        let is_free =
-            |foot: [f64; 3]| road.windows(2).all(|p| distance(p[0], p[1], [foot[0], foot[1]]) >= half_m);
-        self.trees.retain(|t| is_free(t.foot));
-        self.bushes.retain(|b| is_free(b.foot));
+        self.trees.retain(|t| is_free(road, half_m, t.foot));
+        self.clear_road_of_bushes(road, half_m);
     }
+
+    /// The same of bushes alone.
+    pub fn clear_road_of_bushes(&mut self, road: &[[f64; 2]], half_m: f64) {
+        self.bushes.retain(|b| is_free(road, half_m, b.foot));
+    }
+}
+
+/// Whether a plant stands beside a road.
+fn is_free(road: &[[f64; 2]], half_m: f64, foot: [f64; 3]) -> bool {
+    road.windows(2).all(|p| distance(p[0], p[1], [foot[0], foot[1]]) >= half_m)
 }
 
 /// Distance of a place from a segment, m.
@@ -139,12 +169,10 @@ fn place(growth: &Growth, taken: &[[f64; 2]], apart: f64, random: &mut Random) -
 }
 
 fn tree(growth: &Growth, at: [f64; 2], random: &mut Random) -> Tree {
-    // inverse of the distribution function
-    let drawn = libm::pow(-libm::log(random.uniform()), 1.0 / growth.shape);
-    let diameter = (growth.diameter_m * drawn).max(THINNEST);
+    let diameter = growth.diameter(random);
     let height = Tree::usual_height(diameter) * (1.0 + 0.07 * random.normal()).max(0.7);
     let lean = [0; 2].map(|_| growth.lean * random.normal());
-    let species = if random.uniform() < growth.spruces { Species::Spruce } else { Species::Pine };
+    let species = growth.species(random);
     Tree { foot: [at[0], at[1], growth.terrain.height(at)], diameter, height, lean, species }
 }
 

@@ -21,6 +21,8 @@ pub struct RayErrors {
     pub angle_rad: f64,
     /// Added to all ranges, m.
     pub bias_m: f64,
+    /// Deviation of what is added to all ranges of a beam, m.
+    pub beam_bias_m: f64,
     /// Smallest and largest range that is reported, m.
     pub limits_m: [f64; 2],
     /// Probability that a ray is lost.
@@ -36,6 +38,7 @@ const RANGE: u64 = 1;
 const LOSS: u64 = 2;
 const AZIMUTH: u64 = 3;
 const ELEVATION: u64 = 4;
+const BEAM: u64 = 5;
 
 impl RayErrors {
     /// None at all, 0.3 … 120 m.
@@ -44,6 +47,7 @@ impl RayErrors {
         noise_per_m: 0.0,
         angle_rad: 0.0,
         bias_m: 0.0,
+        beam_bias_m: 0.0,
         limits_m: [0.3, 120.0],
         drop_out: 0.0,
         drop_out_per_m: 0.0,
@@ -66,6 +70,14 @@ impl RayErrors {
     pub fn loss(&self, distance: f64, cosine: f64) -> f64 {
         let grazing = 1.0 - cosine.abs().min(1.0);
         self.drop_out + self.drop_out_per_m * distance + self.drop_out_grazing * grazing * grazing
+    }
+
+    /// What is added to all ranges of a beam, m: drawn once for a scanner, as a calibration leaves it.
+    pub fn of_beam(&self, seed: u64, ring: u32) -> f64 {
+        if self.beam_bias_m == 0.0 {
+            return 0.0;
+        }
+        self.beam_bias_m * normal(seed ^ BEAM, mixed(u64::from(ring)))
     }
 
     /// By how much a ray looks aside, in azimuth and in elevation, rad.

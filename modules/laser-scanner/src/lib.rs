@@ -1,6 +1,7 @@
 //! Laser scanners: patterns of beams, motion within a turn, and the errors of a ray.
 //!
 //! * `pattern.rs`: which beams a turn has, in which direction and when.
+//! * `beam.rs`: the extent of a beam, and which of its returns is reported.
 //! * `errors.rs`: from the true distance of a ray to the reported range.
 //! * `faults.rs`: settings that can be changed during a run.
 //! * `cloud.rs`: the points of a turn as a message.
@@ -13,6 +14,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod beam;
 mod cloud;
 mod errors;
 mod faults;
@@ -20,6 +22,7 @@ mod pattern;
 mod scanner;
 mod settings;
 
+pub use beam::{Beam, Returns};
 pub use cloud::{Told, message};
 pub use errors::RayErrors;
 pub use pattern::Pattern;

@@ -1,6 +1,8 @@
 //! The module: which rays are due in a step, and the turns that they make.
 
+use crate::beam::{Echo, Light};
 use crate::cloud::{HEAD, STRIDE, Told, message};
+use crate::errors::RayErrors;
 use crate::faults::{COUNT, Faults};
 use crate::settings::{self, Settings};
 use std::sync::Arc;
@@ -18,11 +20,17 @@ const POINTS: u32 = COUNT as u32;
 const TURNS: u32 = POINTS + 1;
 /// Points that an overlay shows at most.
 const SHOWN: usize = 4000;
+/// Surfaces that light passes through before a ray ends.
+const MOST_PASSED: usize = 16;
+/// Distance behind a surface at which a ray goes on, m.
+const BEHIND: f64 = 1e-6;
 
 /// A laser scanner.
 pub struct LaserScanner {
     settings: Settings,
     seed: u64,
+    /// Added to all ranges of each beam, m.
+    biases: Vec<f64>,
     variables: Vec<Variable>,
     streams: Vec<StreamInfo>,
     frame: String,
@@ -31,7 +39,10 @@ pub struct LaserScanner {
     message: Option<(f64, Vec<u8>)>,
     slots: Slots<State>,
     rays: Vec<Ray>,
+    /// What each of the rays is part of.
+    light: Vec<Light>,
     hits: Vec<RayHit>,
+    echoes: Vec<Echo>,
 }
 
 /// State from step to step.
@@ -78,8 +89,10 @@ impl LaserScanner {
             help: "Points of a turn in the frame of the scanner".into(),
         };
         let faults = Faults::of(&settings.errors);
+        let beams = 0..settings.pattern.elevations.len() as u32;
         Ok(Self {
             seed: host.seed(),
+            biases: beams.map(|ring| settings.errors.of_beam(host.seed(), ring)).collect(),
             variables,
             streams: vec![stream],
             frame: format!("{}/{}", settings.mount.subsystem(), settings.mount.body()),
@@ -88,7 +101,9 @@ impl LaserScanner {
             message: None,
             slots: Slots::new(host.slots()),
             rays: Vec::new(),
+            light: Vec::new(),
             hits: Vec::new(),
+            echoes: Vec::new(),
         })
     }
 
@@ -117,37 +132,77 @@ impl LaserScanner {
             let number = self.state.turn * pattern.rays() as u64 + u64::from(column * beams + ring);
             let aside = self.settings.errors.angles(self.seed, number);
             let direction = turned(orientation, pattern.direction_aside(column, ring, aside));
-            self.rays.push(Ray { origin: position, direction, time, range });
+            let beam = self.light.last().map_or(0, |light| light.beam + 1);
+            for (direction, share) in self.settings.beam.samples(direction) {
+                self.rays.push(Ray { origin: position, direction, time, range });
+                self.light.push(Light { beam, time, from: 0.0, share });
+            }
         }
         Ok(())
     }
 
+    /// Casts the rays through all that light passes; the echoes lie beam by beam then.
+    fn cast(&mut self, skip: BodyRef, world: &dyn World) {
+        self.echoes.clear();
+        for _ in 0..=MOST_PASSED {
+            self.hits.clear();
+            self.hits.resize(self.rays.len(), RayHit::MISS);
+            world.cast_rays(&self.rays, &RayMask::without(skip), &mut self.hits);
+            let mut passing = 0;
+            for (k, hit) in self.hits.iter().enumerate().filter(|(_, hit)| hit.is_hit()) {
+                let (ray, light) = (self.rays[k], self.light[k]);
+                let cosine: f64 = (0..3).map(|k| hit.normal[k] * ray.direction[k]).sum::<f64>().abs();
+                let distance = light.from + hit.distance;
+                self.echoes.push(Echo {
+                    beam: light.beam,
+                    time: light.time,
+                    distance,
+                    cosine,
+                    light: light.share * cosine * f64::from(hit.material.reflectance),
+                    hit: *hit,
+                });
+                let left = ray.range - hit.distance - BEHIND;
+                if hit.material.transmittance > 0.0 && left > 0.0 {
+                    let way = hit.distance + BEHIND;
+                    let origin = [0, 1, 2].map(|k| ray.origin[k] + way * ray.direction[k]);
+                    let share = light.share * f64::from(hit.material.transmittance);
+                    self.rays[passing] = Ray { origin, range: left, ..ray };
+                    self.light[passing] = Light { from: light.from + way, share, ..light };
+                    passing += 1;
+                }
+            }
+            self.rays.truncate(passing);
+            self.light.truncate(passing);
+            if passing == 0 {
+                break;
+            }
+        }
+        self.echoes.sort_by_key(|echo| echo.beam);
+    }
+
     /// Casts the rays from a column on, and returns the points that are reported.
     fn tell(&mut self, first: (u64, u32), skip: BodyRef, world: &dyn World) -> Vec<Told> {
-        self.hits.clear();
-        self.hits.resize(self.rays.len(), RayHit::MISS);
-        world.cast_rays(&self.rays, &RayMask::without(skip), &mut self.hits);
+        self.cast(skip, world);
         let pattern = &self.settings.pattern;
         let beams = pattern.elevations.len();
         let errors = self.state.faults.errors(&self.settings.errors);
         let start = first.0 * pattern.rays() as u64 + u64::from(first.1) * beams as u64;
         let mut told = Vec::new();
-        for (k, (ray, hit)) in
-            self.rays.iter().zip(&self.hits).enumerate().filter(|(_, (_, hit))| hit.is_hit())
-        {
-            let number = start + k as u64;
-            let cosine: f64 = (0..3).map(|k| hit.normal[k] * ray.direction[k]).sum::<f64>().abs();
-            let Some(range) = errors.range(self.seed, number, hit.distance, cosine) else { continue };
+        for echoes in self.echoes.chunk_by_mut(|a, b| a.beam == b.beam) {
+            let Some(echo) = self.settings.beam.reported(echoes) else { continue };
+            let number = start + echo.beam as u64;
             let place = (number % pattern.rays() as u64) as u32;
             let (column, ring) = (place / beams as u32, place % beams as u32);
+            let errors = RayErrors { bias_m: errors.bias_m + self.biases[ring as usize], ..errors };
+            let Some(range) = errors.range(self.seed, number, echo.distance, echo.cosine) else { continue };
             told.push(Told {
                 position: pattern.direction(column, ring).map(|x| range * x),
-                time: ray.time,
-                intensity: cosine * f64::from(hit.material.reflectance),
+                time: echo.time,
+                intensity: echo.light,
                 ring,
-                subsystem: hit.subsystem,
-                body: hit.body,
-                shape: hit.shape,
+                subsystem: echo.hit.subsystem,
+                body: echo.hit.body,
+                shape: echo.hit.shape,
             });
         }
         told
@@ -181,6 +236,7 @@ impl Subsystem for LaserScanner {
         // several turns may end in a step: the message is that of the last one
         loop {
             self.rays.clear();
+            self.light.clear();
             let first = (self.state.turn, self.state.column);
             while self.state.column < columns {
                 let time = self.due(self.state.turn, self.state.column);

@@ -1,5 +1,6 @@
 //! The parameters of the module.
 
+use crate::beam::{Beam, Returns};
 use crate::errors::RayErrors;
 use crate::pattern::Pattern;
 use serde_json::json;
@@ -13,6 +14,7 @@ pub(crate) struct Settings {
     pub rate_hz: f64,
     pub phase: f64,
     pub errors: RayErrors,
+    pub beam: Beam,
     pub sees_own_body: bool,
 }
 
@@ -30,6 +32,7 @@ pub fn schema() -> Schema {
     let share =
         |name: &str, default: f64, help: &str| Parameter::number(name, "", default, help).within(0.0, 1.0);
     let [line, vlp, os1] = Pattern::NAMES;
+    let [strongest, first, last] = Returns::NAMES;
     let pattern = Parameter::of(
         "pattern",
         ParameterType::Text,
@@ -48,6 +51,12 @@ pub fn schema() -> Schema {
         part("noise_per_m", "", 0.0, "Increase of `noise_m` with each metre of range"),
         part("angle_rad", "rad", 0.0, "Standard deviation of azimuth and of elevation"),
         Parameter::number("bias_m", "m", 0.0, "Added to all ranges"),
+        part(
+            "beam_bias_m",
+            "m",
+            0.0,
+            "Standard deviation of what is added to all ranges of a beam, drawn for each",
+        ),
         part("nearest_m", "m", 0.3, "Nearest range that is reported"),
         part("farthest_m", "m", 120.0, "Farthest range that is reported"),
         share("drop_out", 0.0, "Probability that a ray is lost"),
@@ -57,6 +66,27 @@ pub fn schema() -> Schema {
             0.0,
             "Increase of `drop_out` along a surface, by the square of 1 − cosine of incidence",
         ),
+        part(
+            "divergence_rad",
+            "rad",
+            0.0,
+            "Full angle of a beam, at which its light has fallen to 1/e²: seven rays stand for it; 0: a line",
+        )
+        .within(0.0, 0.5),
+        part(
+            "pulse_m",
+            "m",
+            0.6,
+            "Surfaces that are nearer to each other along a beam come back as one point",
+        ),
+        share("threshold", 0.0, "Least share of the light that must come back for a point"),
+        Parameter::of(
+            "returns",
+            ParameterType::Text,
+            "Return of a beam that is reported where it meets several surfaces",
+        )
+        .or(strongest)
+        .choices(&[strongest, first, last]),
         Parameter::of("sees_own_body", ParameterType::Bool, "Whether rays meet the body that it sits on")
             .or(false),
     ];
@@ -81,11 +111,15 @@ impl Settings {
             }
             None => return Err(Error::Refused(format!("parameter `pattern` = \"{name}\" is no pattern"))),
         };
-        if pattern.rays() > MOST_RAYS {
-            let why = format!(
-                "{} rays in a turn are more than {MOST_RAYS}: fewer `columns` or beams",
-                pattern.rays()
-            );
+        let beam = Beam {
+            divergence_rad: config.number("divergence_rad")?,
+            pulse_m: config.number("pulse_m")?,
+            threshold: config.number("threshold")?,
+            returns: Returns::named(config.text("returns")?).unwrap_or(Returns::Strongest),
+        };
+        let rays = pattern.rays() * beam.rays();
+        if rays > MOST_RAYS {
+            let why = format!("{rays} rays in a turn are more than {MOST_RAYS}: fewer `columns` or beams");
             return Err(Error::Refused(why));
         }
         let limits_m = [config.number("nearest_m")?, config.number("farthest_m")?];
@@ -97,6 +131,7 @@ impl Settings {
             noise_per_m: config.number("noise_per_m")?,
             angle_rad: config.number("angle_rad")?,
             bias_m: config.number("bias_m")?,
+            beam_bias_m: config.number("beam_bias_m")?,
             limits_m,
             drop_out: config.number("drop_out")?,
             drop_out_per_m: config.number("drop_out_per_m")?,
@@ -108,6 +143,7 @@ impl Settings {
             rate_hz: config.number("rate_hz")?,
             phase: config.number("phase")?,
             errors,
+            beam,
             sees_own_body: config.flag("sees_own_body")?,
         })
     }

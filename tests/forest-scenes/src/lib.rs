@@ -74,7 +74,7 @@ impl Forest {
     /// # Errors
     /// A world that is refused.
     pub fn around(growth: Growth, stand: Stand, seed: u64, machine: &Machine) -> Result<Self> {
-        let plants = plants(&stand, seed);
+        let plants = plants(&stand, seed, 0.0);
         let mut builder = WorldBuilder::new();
         builder.subsystem("stand", &plants.scene, &plants.states, &vec![true; plants.states.len()])?;
         let mut states = machine.states.clone();

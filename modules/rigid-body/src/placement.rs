@@ -11,7 +11,8 @@ use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::{Ray, RayCast};
 use terraglue_subsystem::{Error, Result, Terrain};
 
-/// Coordinates of all joints from a table of patterns: an exact name wins, else the longest pattern that matches.
+/// Coordinates of all joints from a table of patterns: an exact name wins, else the longest pattern that matches. Others are 0, or the end of their
+/// range next to it.
 pub(crate) fn coordinates(model: &Model, table: &[(String, f64)]) -> Result<Vec<f64>> {
     known(model, "joints", table)?;
     model.joints.iter().map(|joint| coordinate(joint, table)).collect()
@@ -47,7 +48,7 @@ fn best<'a>(joint: &Joint, table: &'a [(String, f64)]) -> Option<&'a (String, f6
 
 fn coordinate(joint: &Joint, table: &[(String, f64)]) -> Result<f64> {
     let Some((pattern, value)) = best(joint, table) else {
-        return Ok(0.0);
+        return Ok(joint.limits.map_or(0.0, |[lower, upper]| 0.0_f64.max(lower).min(upper)));
     };
     match joint.limits {
         Some([lower, upper]) if !(lower..=upper).contains(value) => Err(Error::Refused(format!(

@@ -57,7 +57,7 @@ fn start() -> Vec<Parameter> {
             ..Parameter::of(
                 "joints",
                 ParameterType::NumberTable,
-                "Initial coordinate by joint name (rad or m); `*` stands for any text; others start at 0",
+                "Initial coordinate by joint name (rad or m); `*` stands for any text; others start at 0, or at the end of their range next to it",
             )
             .optional()
         },

@@ -91,3 +91,14 @@ fn what_follows_from_joints_and_what_comes_late_is_refused_and_changes_nothing()
     refused(&mut fixture, "body.z", 1.0, "before the first step");
     refused(&mut fixture, "LF_j2.angle", 0.1, "before the first step");
 }
+
+#[test]
+fn a_joint_whose_range_has_no_zero_starts_at_its_end() {
+    for motor in ["position", "velocity", "torque", "off"] {
+        let json = format!(r#"{{"model": "models/harvester.urdf", "motor": {{"*": "{motor}"}}}}"#);
+        let mut fixture = Fixture::new(&json, G, 1e-3);
+        assert_eq!(fixture.get("luff.angle"), 0.2);
+        (0..20).for_each(|_| fixture.free_step());
+        assert!((fixture.get("luff.angle") - 0.2).abs() < 0.05, "{}", fixture.get("luff.angle"));
+    }
+}

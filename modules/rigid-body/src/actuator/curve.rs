@@ -346,13 +346,13 @@ impl Curve {
     /// Position of the axis at a rate.
     fn locate(&self, u: f64) -> Mode {
         let i = self.index_at(u);
-        let line = self.pieces[i].line.at_zero;
-        if line == f64::INFINITY && i < self.count {
-            self.on_kink(i)
-        } else if line == f64::NEG_INFINITY && i > 0 {
-            self.on_kink(i - 1)
-        } else {
-            self.on_line(i)
+        let line = |i: usize| self.pieces[i].line.at_zero;
+        // beyond a stop: to the stop, past kinks of what acts beside it
+        let up = (i..self.count).find(|k| line(k + 1) < f64::INFINITY);
+        let down = (0..i).rev().find(|k| line(*k) > f64::NEG_INFINITY);
+        match (line(i), up, down) {
+            (f64::INFINITY, Some(k), _) | (f64::NEG_INFINITY, _, Some(k)) => self.on_kink(k),
+            _ => self.on_line(i),
         }
     }
 

@@ -13,6 +13,7 @@ fn balance(curve: &Curve, m: f64, v: f64) -> (f64, f64) {
             }
             None => (v + curve.impulse(mode) / m, curve.impulse(mode)),
         };
+        assert!(u.is_finite() && lambda.is_finite(), "{mode:?}: {u} {lambda}");
         let next = curve.next(mode, u, lambda);
         if next == mode {
             return (u, lambda);
@@ -80,4 +81,22 @@ fn a_rigid_motor_gives_what_it_needs_up_to_its_bound() {
     assert!((u - 1.0).abs() < 1e-15 && (lambda - 0.2).abs() < 1e-12);
     assert_eq!(balance(&curve, 2.0, 0.0), (0.25, 0.5));
     assert_eq!(curve.value(7.0), -0.5);
+}
+
+#[test]
+fn an_axis_beyond_a_stop_is_led_back_whatever_its_motor_does() {
+    for (stop, side) in [(200.0, 1.0), (-200.0, -1.0)] {
+        // a motor of 0.06 N m s at most, with a law that rises to it within a rate of 0.1 rad/s
+        let law = Curve::line(Line { at_zero: 0.0, slope: 0.6 }, Tag::Law);
+        let mut axis = law.at_most(Line::level(0.06), Tag::High).at_least(Line::level(-0.06), Tag::Low);
+        let (left, right) = if side > 0.0 { (f64::INFINITY, 0.0) } else { (0.0, f64::NEG_INFINITY) };
+        axis.add_step(stop, left, right, Tag::LowerLimit);
+        for rate in [0.0, 0.05, -0.05, 5.0, -5.0, 300.0, -300.0] {
+            let mode = axis.start(Mode::Free, rate);
+            let (_, wanted) = axis.row(mode).unwrap_or_default();
+            assert!(wanted.is_finite() && axis.impulse(mode).is_finite(), "{rate}: {mode:?}");
+        }
+        let (u, lambda) = balance(&axis, 2.0, 0.0);
+        assert!((u - stop).abs() < 1e-12 && lambda.is_finite(), "{u} {lambda}");
+    }
 }

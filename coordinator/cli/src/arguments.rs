@@ -46,6 +46,9 @@ pub enum Command {
         /// Folder of the run, e.g. runs/moon_walk.
         #[arg(value_name = "DIR")]
         folder: PathBuf,
+        /// Also write the points of all scanners, in the world, as LAS or LAZ.
+        #[arg(long, value_name = "FILE")]
+        points: Option<PathBuf>,
     },
     /// Show a run on a page while it goes on: look, change it, go back in it; or replay a recording. Viewers of the Foxglove
     /// WebSocket protocol connect to the same address.
@@ -187,6 +190,9 @@ pub struct RunCommand {
     /// Write recording and summary only; `terraglue report DIR` makes the report later.
     #[arg(long)]
     pub no_report: bool,
+    /// Also write the points of all scanners, in the world, as LAS or LAZ (scan.laz).
+    #[arg(long, value_name = "FILE", conflicts_with = "serve")]
+    pub points: Option<PathBuf>,
     /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
     #[arg(long)]
     pub strict: bool,

@@ -23,6 +23,7 @@ mod logger;
 mod new;
 mod output;
 mod pace;
+mod points;
 mod progress;
 mod report;
 mod robot;
@@ -111,7 +112,7 @@ fn command(command: Command) -> Exit {
         Command::Run(arguments) => run::run(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
-        Command::Report { folder } => report::report(&folder),
+        Command::Report { folder, points } => report::report(&folder, points.as_deref()),
         Command::Serve(arguments) => serve::serve(&arguments),
         Command::Shot(arguments) => shot::shot(&arguments),
         Command::Video(arguments) => video::video(&arguments),

@@ -3,14 +3,17 @@
 use super::Exit;
 use super::folder::free;
 use super::output::outln;
+use super::points;
 use std::path::Path;
 use terraglue_diagnostics::Result;
 use terraglue_recording as recording;
 use terraglue_recording::{CHECKPOINT, RECORDING, Recording};
 use terraglue_scenario::InputError;
 
-/// Mends the recording of a folder where its end is missing and nothing goes on with it, then writes the report.
-pub fn report(folder: &Path) -> Result<Exit> {
+/// Mends the recording of a folder where its end is missing and nothing goes on with it, then writes the report, and the points of its scanners
+/// where a file is named.
+pub fn report(folder: &Path, points: Option<&Path>) -> Result<Exit> {
+    points.map(points::check).transpose()?;
     let path = folder.join(RECORDING);
     if !path.is_file() {
         let message = format!("there is no {RECORDING} in `{}`", folder.display());
@@ -39,5 +42,8 @@ pub fn report(folder: &Path) -> Result<Exit> {
         eprintln!("warning: `{}` is damaged: {damaged} parts of it are left out", path.display());
     }
     outln!("report: {}", recording::report::write(folder)?.display());
+    if let Some(path) = points {
+        outln!("points: {} ({} points)", path.display(), points::write(folder, path)?);
+    }
     Ok(Exit::Done)
 }

@@ -143,7 +143,7 @@ mod tests {
             ("x,y,species\n1,2,oak\n", "line 2: `species` = \"oak\" is neither pine nor spruce"),
             ("x,y\n1,2\n5,6\n1.01,2\n", "lines 2 and 4: two trees at the same place"),
         ] {
-            assert_eq!(read(text).map(|l| l.stand).unwrap_err(), wanted);
+            assert_eq!(read(text).map(|l| l.stand).expect_err(wanted), wanted);
         }
         assert!(read("x,y\n1,2,3\n").is_err());
     }

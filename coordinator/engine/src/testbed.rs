@@ -245,7 +245,7 @@ impl Testbed {
     /// (2) Outputs of t become inputs of the step of length h; `repeated`: of one that was discarded with a greater length.
     fn transfer_signals(&mut self, h: f64, repeated: bool) -> Result {
         let instances = &mut self.subsystems.instances;
-        if self.clock.index == 0 && self.clock.t == 0.0 {
+        if self.clock.index == 0 && self.clock.t == 0.0 && !repeated {
             self.signals.initialize(instances)?;
         }
         let (t_s, events) = (self.clock.t, &mut self.events);
@@ -280,7 +280,7 @@ impl Testbed {
                 self.signals.links.feed(stream, bytes)
             })?;
         } else {
-            self.uncoupled.discard(&mut self.subsystems)?;
+            self.uncoupled.discard(&mut self.signals.links, &mut self.subsystems)?;
         }
         Ok(outcome)
     }

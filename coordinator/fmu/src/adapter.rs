@@ -68,6 +68,7 @@ impl FmuSubsystem {
         let fmu = Fmu::open(path).map_err(error)?;
         let (options, start) = options(parameters)?;
         opening::warn(&fmu, options.strict, &*host)?;
+        opening::warn_of_start(fmu.description(), parameters, &*host);
         let mut instance =
             FmuInstance::instantiate(&fmu, opening::of_instance(&options, &host)?).map_err(error)?;
         let (structure, start) = structure(instance.description(), start)?;

@@ -409,7 +409,7 @@ fn connect() -> Table {
         Parameter::of("convert", ParameterType::Bool, "false: units are neither converted nor compared")
             .or(true)
             .into(),
-        text("order", "structure: FMUs whose outputs depend on this input are stepped after the FMU that feeds it, so that the value is not late; jacobi: the input is the output of the start of the step; iterate: the FMUs of a loop repeat the step, where they can in two halves, until the values in the middle and at the end are those that it was made with; iterate-ends: the same with the values at the end alone")
+        text("order", "structure: FMUs whose outputs depend on this input are stepped after the FMU that feeds it, so that the value is not late; jacobi: the input is the output of the start of the step; iterate: the FMUs of a loop repeat the step, where they can in four quarters, until the values in the middle and at the end are those that it was made with; iterate-ends: the same with the values at the end alone")
             .or("structure")
             .choices(ConnectionOrder::NAMES)
             .into(),

@@ -100,21 +100,16 @@ impl Signals {
         self.write(instances)
     }
 
-    /// Inputs of a step that is repeated with another length: those that follow a line take its mean anew; all others stay as they were set, and
-    /// outputs are read anew where a loop begins again. What the discarded step has left in other outputs is not of t.
+    /// Inputs of a step that is repeated with another length: those that follow a line take its mean anew; all others stay as they were set. What the
+    /// discarded step has left in outputs is not of t.
     ///
     /// # Errors
     /// As of [`Signals::read`] and [`Signals::write`].
     pub fn transfer_again(&mut self, moment: Moment, instances: &mut [Instance]) -> Result {
-        for link in &mut self.links.numbers {
-            if link.is_iterated() {
-                link.read(instances)?;
-            } else if link.follows_line() {
-                link.extrapolate(moment, instances)?;
-                link.pass_on_ahead(instances)?;
-            }
-        }
-        Ok(())
+        self.links.numbers.iter_mut().filter(|link| link.follows_line()).try_for_each(|link| {
+            link.extrapolate(moment, instances)?;
+            link.pass_on_ahead(instances)
+        })
     }
 
     /// Reads all outputs but those that are passed within the step. None is passed on before all are read, so that direct feed-through cannot leak values of the same step.

@@ -2,34 +2,38 @@
 //!
 //! Loops of a run are repeated beside each other, each with its own values: one that is solved keeps them, whatever others still do.
 //!
-//! A trial is one step of each FMU, or two of half the length. With u the value of an output at the start, in the middle (m) and at the end (e) of
-//! the step, an input that is integrated is held at (u + e)/2 over a whole step; over the halves at (3u + 4m − e)/6 and (4m + 3e − u)/6, which
-//! have the mean and the first moment of the parabola through the three values: an FMU that integrates the input once or twice makes
-//! a step of the fourth order, and, as start and end are treated alike, a loop without damping neither gains nor loses amplitude.
+//! A trial is one step of each FMU, or four of a quarter of the length. With u the value of an output at the start, in the middle (m) and at the end
+//! (e) of the step, an input that is integrated is held at (u + e)/2 over a whole step; over the quarters at (7u + 8m − 3e)/12, (3u + 8m + e)/12,
+//! (u + 8m + 3e)/12 and (8m + 7e − 3u)/12. These lead a rate to ∫p and a place to ∫∫p as the three-stage Lobatto IIIA method has them (Hairer and Wanner,
+//! Solving Ordinary Differential Equations II, 1996, section IV.5), with p the parabola through the three values: of fourth order, A-stable, and as start
+//! and end are treated alike, a loop without damping neither gains nor loses amplitude.
 
 use super::newton::Newton;
 use crate::signals::{FeedThroughs, Link, Links, held};
 use terraglue_diagnostics::Result;
 use terraglue_gluing::acceleration::Acceleration;
 use terraglue_host::Instance;
+use terraglue_numerics::extremes::larger;
 use terraglue_scenario::Relaxation;
-use terraglue_subsystem::{Capabilities, ValueType};
 
-/// Largest difference of a value and the one that the step was made with, relative to the larger of it and 1e-3 in its unit.
+/// Largest difference of a value and the one that the step was made with, relative to the largest at the starts of steps and in their first trials. Values that have always
+/// been rounding errors never come so far: where repetitions bring them no nearer, it is relative to the larger of the value and [`SMALL`].
 const TOLERANCE: f64 = 1e-10;
+/// Repetitions in a row that bring values no nearer.
+const STUCK: u32 = 3;
+/// In the unit of a value.
+const SMALL: f64 = 1e-3;
 
-/// Values that grow by this factor beyond those of start and first trial have no solution.
-const RUNAWAY: f64 = 1e6;
+/// Values that grow by this factor beyond those of start and first trial, and beyond 1 in their unit, have no solution.
+const RUNAWAY: f64 = 1e12;
 
 /// A part of a step that a trial is made of.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Part {
     /// All of it.
     Whole,
-    /// From its start to its middle.
-    FirstHalf,
-    /// From its middle to its end.
-    SecondHalf,
+    /// One of four, from 0 on.
+    Quarter(u32),
 }
 
 /// A connection of a loop.
@@ -46,16 +50,24 @@ pub(super) struct LoopValues {
     links: Vec<Iterated>,
     /// Subsystems of the loop.
     members: Vec<usize>,
-    /// Why trials are whole steps; empty: they are made of halves.
+    /// Subsystems that feed it within the step and are no part of it.
+    sources: Vec<usize>,
+    /// Why trials are whole steps; empty: they are made of quarters.
     why_whole: String,
-    /// Whether trials of this step are made of halves.
-    by_halves: bool,
+    /// Whether trials of this step are made of quarters.
+    by_quarters: bool,
     /// Values at the start of the step.
     start: Vec<f64>,
-    /// Values that the trial was made with: at the end of the step and, by halves, then those in the middle.
+    /// Values that the trial was made with: at the end of the step and, by quarters, then those in the middle.
     guess: Vec<f64>,
-    /// Outputs in the middle of the trial.
-    middle: Vec<f64>,
+    /// Outputs after each of the first three quarters of the trial.
+    within: [Vec<f64>; 3],
+    /// Whether a subsystem did not move in a quarter of the trial, but in the step.
+    lags: bool,
+    /// Largest difference relative to the largest value at the last trial.
+    off: f64,
+    /// Trials in a row that did not halve it.
+    stuck: u32,
     /// Size of the values at start and first trial.
     scale: Vec<f64>,
     /// Differences of the outputs and the guess at the last trial.
@@ -65,13 +77,13 @@ pub(super) struct LoopValues {
 }
 
 impl LoopValues {
-    /// Of the iterated connections among `numbers` to subsystems of a loop.
+    /// Of the iterated connections among `numbers` to the members of a loop; `cannot` says why a subsystem makes no steps of a quarter of the length.
     pub fn new(
         numbers: Vec<usize>,
         links: &Links,
         feed_through: &FeedThroughs,
-        instances: &[Instance],
-        members: Vec<usize>,
+        [members, sources]: [Vec<usize>; 2],
+        cannot: impl Fn(usize) -> Option<String>,
     ) -> Self {
         let takes_end = |link: &Link| link.ends().map(|([_, to], _)| feed_through.takes_end(to)).collect();
         let newton = Newton::new(numbers.iter().copied(), links, &members);
@@ -81,33 +93,51 @@ impl LoopValues {
             .map(|link| Iterated { link, takes_end: takes_end(&links.numbers[link]) })
             .collect();
         let integrates = own.iter().any(|i| i.takes_end.contains(&false));
-        let fixed = members.iter().map(|slot| &instances[*slot]).find_map(makes_no_halves);
-        let why_whole = match fixed {
+        let why_whole = match members.iter().chain(&sources).find_map(|slot| cannot(*slot)) {
             _ if at_ends => "as `iterate-ends` asks".to_owned(),
             _ if !integrates => "as outputs follow all its values at once".to_owned(),
-            Some(why) => why,
+            Some(why) => format!("as {why}"),
             None => String::new(),
         };
         Self {
             newton,
             links: own,
             members,
+            sources,
             why_whole,
-            by_halves: false,
+            by_quarters: false,
             start: Vec::new(),
             guess: Vec::new(),
-            middle: Vec::new(),
+            within: Default::default(),
+            lags: false,
+            off: f64::INFINITY,
+            stuck: 0,
             scale: Vec::new(),
             missed: Vec::new(),
             acceleration: Acceleration::new(Relaxation::Anderson, 1.0),
         }
     }
 
+    /// Subsystems of it and those that feed it.
+    pub fn parts(&self) -> impl Iterator<Item = usize> + '_ {
+        self.members.iter().chain(&self.sources).copied()
+    }
+
+    /// Whether its steps are always whole.
+    pub fn is_whole(&self) -> bool {
+        !self.why_whole.is_empty()
+    }
+
+    /// Makes its steps whole, for a reason.
+    pub fn make_whole(&mut self, why: String) {
+        self.why_whole = why;
+    }
+
     /// How it is solved, in words.
     pub fn way(&self, instances: &[Instance]) -> String {
         let newton = self.newton.way(instances, &self.members);
         match self.why_whole.as_str() {
-            "" => format!("{newton}; values are exchanged in the middle of the step, too"),
+            "" => format!("{newton}; values are exchanged in the middle of the step, too, in quarters of it"),
             why => format!("{newton}; values are exchanged at its end only, {why}"),
         }
     }
@@ -117,75 +147,115 @@ impl LoopValues {
         &self.members
     }
 
-    /// Whether trials of this step are made of halves.
-    pub fn goes_by_halves(&self) -> bool {
-        self.by_halves
+    /// Whether trials of this step are made of quarters.
+    pub fn goes_by_quarters(&self) -> bool {
+        self.by_quarters
+    }
+
+    /// Whether a subsystem has a solver step of its own that is longer than a quarter of the step.
+    pub fn lags(&self) -> bool {
+        self.lags
     }
 
     /// Keeps the values at the start of the step; the first trial is a whole step that is made with them.
-    pub fn begin(&mut self, links: &Links) {
-        let values = |i: &Iterated| {
-            let link = &links.numbers[i.link];
-            (0..link.count()).map(|k| link.value(k)).collect::<Vec<f64>>()
-        };
-        self.start = self.links.iter().flat_map(values).collect();
+    pub fn begin(&mut self, links: &mut Links) {
+        self.start.clear();
+        for own in &self.links {
+            let link = &mut links.numbers[own.link];
+            link.learn();
+            self.start.extend((0..link.count()).map(|k| link.value(k)));
+        }
         self.guess.clone_from(&self.start);
-        self.by_halves = false;
+        (self.by_quarters, self.lags, self.off, self.stuck) = (false, false, f64::INFINITY, 0);
         self.scale.clear();
         self.acceleration.begin();
     }
 
-    /// Takes the outputs in the middle of a trial.
-    pub fn take_middle(&mut self, links: &mut Links, instances: &[Instance]) -> Result {
-        read(&self.links, links, instances, &mut self.middle)
+    /// Makes the connections show the values at the start of the step.
+    pub fn back(&self, links: &mut Links) {
+        let mut start = self.start.iter();
+        for own in &self.links {
+            let link = &mut links.numbers[own.link];
+            (0..link.count()).zip(&mut start).for_each(|(k, value)| *link.value_mut(k) = *value);
+        }
+    }
+
+    /// From now on in whole steps until the end of this one.
+    pub fn go_whole(&mut self) {
+        self.guess.truncate(self.start.len());
+        self.scale.truncate(self.start.len());
+        (self.by_quarters, self.lags, self.off, self.stuck) = (false, false, f64::INFINITY, 0);
+        self.acceleration.begin();
+    }
+
+    /// Takes the outputs after one of the first three quarters of a trial.
+    pub fn take_within(&mut self, quarter: usize, links: &mut Links, instances: &[Instance]) -> Result {
+        read(&self.links, links, instances, &mut self.within[quarter])
     }
 
     /// Whether the outputs are those that the trial was made with; if not, a better guess is there.
     pub fn stands(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
         let (own, residual) = (&self.links, self.acceleration.residual());
         read(own, links, instances, residual)?;
-        if self.by_halves && stays_until_the_end(own, links, [&self.start, &self.middle, residual]) {
-            self.guess.clone_from(residual);
-            self.by_halves = false;
-            self.acceleration.begin();
-            return Ok(false);
+        let first = self.scale.is_empty();
+        if first {
+            own.iter().for_each(|i| links.numbers[i.link].learn());
         }
-        if self.by_halves {
-            residual.extend_from_slice(&self.middle);
+        if self.by_quarters {
+            let [a, b, c] = &self.within;
+            self.lags = lags(own, links, [&self.start, a, b, c, residual]);
+            residual.extend_from_slice(b);
         }
-        let mut stands = true;
-        for (value, guess) in residual.iter_mut().zip(&self.guess) {
-            stands &= (*value - guess).abs() <= TOLERANCE * value.abs().max(guess.abs()).max(1e-3);
+        let largest: Vec<f64> = own
+            .iter()
+            .flat_map(|i| {
+                let link = &links.numbers[i.link];
+                (0..link.count()).map(|k| link.largest(k))
+            })
+            .collect();
+        let (mut off, mut is_small): (f64, bool) = (0.0, true);
+        for ((value, guess), largest) in residual.iter_mut().zip(&self.guess).zip(largest.iter().cycle()) {
+            let missed = (*value - guess).abs();
+            is_small &= missed <= TOLERANCE * value.abs().max(guess.abs()).max(SMALL);
+            if missed > 0.0 || missed.is_nan() {
+                let size = if *largest > 0.0 { *largest } else { value.abs().max(guess.abs()) };
+                off = larger(off, missed / size);
+            }
             *value -= guess;
         }
         self.missed.clone_from(residual);
-        let first = self.scale.is_empty();
-        if first {
-            let sizes = self.guess.iter().zip(&*residual).map(|(u, r)| u.abs().max((u + r).abs()).max(1e-3));
-            self.scale.extend(sizes);
-        }
-        if stands {
+        self.stuck = if off > 0.5 * self.off { self.stuck + 1 } else { 0 };
+        self.off = off;
+        if off <= TOLERANCE || (is_small && self.stuck >= STUCK) {
             return Ok(true);
         }
+        if first {
+            let sizes = self.guess.iter().zip(&*residual).map(|(u, r)| u.abs().max((u + r).abs()).max(1.0));
+            self.scale.extend(sizes);
+        }
         self.newton.solve(residual, links, instances)?;
-        let step = self.acceleration.step(&self.guess);
-        self.guess.iter_mut().zip(step).for_each(|(guess, d)| *guess += d);
+        // values of different units count alike
+        let unit = |largest: &f64| if *largest > 0.0 { *largest } else { 1.0 };
+        let units = || largest.iter().map(unit).cycle();
+        residual.iter_mut().zip(units()).for_each(|(r, unit)| *r /= unit);
+        let scaled: Vec<f64> = self.guess.iter().zip(units()).map(|(guess, unit)| guess / unit).collect();
+        let step = self.acceleration.step(&scaled);
+        self.guess.iter_mut().zip(step).zip(units()).for_each(|((guess, d), unit)| *guess += d * unit);
         if first && self.why_whole.is_empty() {
-            self.begin_halves();
+            self.begin_quarters();
         }
         Ok(false)
     }
 
-    /// From now on by halves; the first guess of the middle is the mean of start and end.
-    fn begin_halves(&mut self) {
-        self.by_halves = true;
+    /// From now on by quarters; the first guess of the middle is the mean of start and end.
+    fn begin_quarters(&mut self) {
+        self.by_quarters = true;
         self.guess.extend_from_within(..);
         let n = self.start.len();
-        self.guess[n..]
-            .iter_mut()
-            .zip(&self.start)
-            .for_each(|(middle, start)| *middle = 0.5 * (*middle + start));
+        let middle = self.guess[n..].iter_mut();
+        middle.zip(&self.start).for_each(|(middle, start)| *middle = 0.5 * (*middle + start));
         self.scale.extend_from_within(..);
+        (self.off, self.stuck) = (f64::INFINITY, 0);
         self.acceleration.begin();
     }
 
@@ -210,14 +280,19 @@ impl LoopValues {
 
     /// What an input is held at over a part of the step.
     fn input(&self, part: Part, k: usize, takes_end: bool) -> f64 {
-        let n = self.start.len();
-        let (start, end) = (self.start[k], self.guess[k]);
-        match part {
-            Part::Whole => held(takes_end, start, end),
-            Part::FirstHalf if takes_end => self.guess[n + k],
-            Part::SecondHalf if takes_end => end,
-            Part::FirstHalf => (3.0 * start + 4.0 * self.guess[n + k] - end) / 6.0,
-            Part::SecondHalf => (4.0 * self.guess[n + k] + 3.0 * end - start) / 6.0,
+        let (u, e) = (self.start[k], self.guess[k]);
+        let Part::Quarter(quarter) = part else { return held(takes_end, u, e) };
+        let m = self.guess[self.start.len() + k];
+        match (quarter, takes_end) {
+            // of the parabola, at the end of the quarter
+            (0, true) => (3.0 * u + 6.0 * m - e) / 8.0,
+            (1, true) => m,
+            (2, true) => (3.0 * e + 6.0 * m - u) / 8.0,
+            (_, true) => e,
+            (0, false) => (7.0 * u + 8.0 * m - 3.0 * e) / 12.0,
+            (1, false) => (3.0 * u + 8.0 * m + e) / 12.0,
+            (2, false) => (u + 8.0 * m + 3.0 * e) / 12.0,
+            (_, false) => (8.0 * m + 7.0 * e - 3.0 * u) / 12.0,
         }
     }
 
@@ -241,9 +316,9 @@ fn read(own: &[Iterated], links: &mut Links, instances: &[Instance], out: &mut V
     Ok(())
 }
 
-/// Whether a subsystem leaves all its outputs, until the middle of the step, as they were at the start, and changes them at its end: it has a
-/// solver step of its own that is longer than half a step, so its outputs in the middle are not those of the middle.
-fn stays_until_the_end(own: &[Iterated], links: &Links, [start, middle, end]: [&[f64]; 3]) -> bool {
+/// Whether a subsystem leaves all its outputs as they are over a quarter of a step that changes them: it has a solver step of its own that is longer than a
+/// quarter, so its outputs within the step are not those of their times.
+fn lags(own: &[Iterated], links: &Links, values: [&[f64]; 5]) -> bool {
     let ranges = own.iter().scan(0, |first, i| {
         let link = &links.numbers[i.link];
         let range = *first..*first + link.count();
@@ -252,18 +327,8 @@ fn stays_until_the_end(own: &[Iterated], links: &Links, [start, middle, end]: [&
     });
     let ranges: Vec<_> = ranges.collect();
     ranges.iter().any(|(slot, _)| {
-        let mut all = ranges.iter().filter(|(other, _)| other == slot).flat_map(|(_, range)| range.clone());
-        all.clone().all(|k| start[k] == middle[k]) && all.any(|k| start[k] != end[k])
+        let all = ranges.iter().filter(|(other, _)| other == slot).flat_map(|(_, range)| range.clone());
+        let same = |a: &[f64], b: &[f64]| all.clone().all(|k| a[k] == b[k]);
+        values.windows(2).any(|pair| same(pair[0], pair[1])) && !same(values[0], values[4])
     })
-}
-
-/// Why a subsystem makes no steps of half the length, if it does not.
-fn makes_no_halves(instance: &Instance) -> Option<String> {
-    let has_clocks = instance.variables().iter().any(|v| v.value_type == ValueType::Clock);
-    let why = match instance.capabilities().has(Capabilities::FIXED_STEP) {
-        true => "makes steps of one length only",
-        false if has_clocks => "has clocks",
-        false => return None,
-    };
-    Some(format!("as `{}` {why}", instance.name()))
 }

@@ -1,9 +1,9 @@
 //! Loops of connections that are solved within a step (`order = "iterate"`): FMUs repeat the step until the outputs at its end are
 //! those that it was made with.
 //!
-//! Where all FMUs of a loop can, and inputs of it are integrated, each repetition is made of two halves, with the outputs in the middle as further
-//! values: of fourth order. Else it is one step: an input that outputs of the loop follow at once takes the value at its end, any other one the
-//! mean of the values at start and end, which is of second order. Each repetition begins with the state at the start of the step.
+//! Where all FMUs of a loop and those that feed it can, and inputs of it are integrated, each repetition is made of four quarters, with the outputs in the
+//! middle as further values: of fourth order. Else it is one step: an input that outputs of the loop follow at once takes the value at its end, any
+//! other one the mean of the values at start and end, which is of second order. Each repetition begins with the state at the start of the step.
 //! FMUs that only take values of a loop are stepped when it is solved.
 //!
 //! The next values are those that Anderson's combination (1965) makes of the last six, of Newton's steps where all FMUs of the loop have
@@ -20,7 +20,7 @@ use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_scenario::ModuleKind;
-use terraglue_subsystem::{Capabilities, Motion, Response};
+use terraglue_subsystem::{Capabilities, Motion, Response, ValueType};
 
 /// Most repetitions of a step.
 const MOST: u32 = 60;
@@ -33,7 +33,7 @@ pub(super) const NO_LOOP: &str =
 #[derive(Debug, Default)]
 pub(super) struct Loops {
     loops: Vec<LoopValues>,
-    /// Those that repeat the step, ascending.
+    /// Those that repeat the step, ascending: parts of loops, and what feeds a loop that goes by quarters.
     members: Vec<usize>,
     /// Those that take values of a loop within the step, and are not part of it.
     followers: Vec<usize>,
@@ -55,7 +55,9 @@ impl Loops {
         state: u32,
     ) -> std::result::Result<Self, String> {
         let mut loops = Self { state, ..Self::default() };
-        let component = loops.find_members(links, instances);
+        let edges = edges(links, instances);
+        loops.find_members(links, &edges, instances.len());
+        let component = components(instances.len(), &edges);
         for slot in &loops.members {
             let (instance, schedule) = (&instances[*slot], &schedules[*slot]);
             if let Some(why) = cannot_repeat(instance, schedule) {
@@ -74,29 +76,56 @@ impl Loops {
             }
             iterated.entry(component[link.slots()[1]]).or_default().push(k);
         }
+        let backwards: Vec<[usize; 2]> = edges.iter().map(|[from, to]| [*to, *from]).collect();
+        let cannot = |slot: usize| makes_no_quarters(&instances[slot], &schedules[slot]);
         for (number, numbers) in iterated {
-            let own = loops.members.iter().copied().filter(|slot| component[*slot] == number).collect();
-            loops.loops.push(LoopValues::new(numbers, links, feed_through, instances, own));
+            let own: Vec<usize> =
+                loops.members.iter().copied().filter(|slot| component[*slot] == number).collect();
+            let before = reached(instances.len(), &backwards, own.iter().copied());
+            let sources = (0..instances.len()).filter(|slot| before[*slot] && !own.contains(slot)).collect();
+            loops.loops.push(LoopValues::new(numbers, links, feed_through, [own, sources], cannot));
         }
+        loops.find_whole(instances);
+        let fed = loops.loops.iter().filter(|own| !own.is_whole());
+        let parts: Vec<usize> = fed.flat_map(LoopValues::parts).collect();
+        loops.members.extend(parts);
+        loops.members.sort_unstable();
+        loops.members.dedup();
+        let behind = reached(instances.len(), &edges, loops.members.iter().copied());
+        let follows = |slot: &usize| behind[*slot] && !loops.members.contains(slot);
+        loops.followers = (0..instances.len()).filter(follows).collect();
         Ok(loops)
     }
 
-    /// Finds those that repeat the step, and those that follow: an FMU that a loop reaches is part of it if it acts on the loop. Answers with
-    /// the number of the loop of each subsystem.
-    fn find_members(&mut self, links: &Links, instances: &[Instance]) -> Vec<usize> {
+    /// A loop goes in whole steps, too, where one that does shares an FMU with it: each makes one kind of step.
+    fn find_whole(&mut self, instances: &[Instance]) {
+        loop {
+            let whole = self.loops.iter().filter(|own| own.is_whole());
+            let stepped: Vec<usize> = whole.flat_map(|own| own.members().iter().copied()).collect();
+            let mut changed = false;
+            for own in self.loops.iter_mut().filter(|own| !own.is_whole()) {
+                let shared = own.parts().find(|slot| stepped.contains(slot));
+                if let Some(slot) = shared {
+                    let name = instances[slot].name();
+                    own.make_whole(format!("as `{name}`, which feeds it, makes whole steps"));
+                    changed = true;
+                }
+            }
+            if !changed {
+                return;
+            }
+        }
+    }
+
+    /// Finds those that repeat the step, and those that follow: an FMU that a loop reaches is part of it if it acts on the loop.
+    fn find_members(&mut self, links: &Links, edges: &[[usize; 2]], count: usize) {
         let iterated: Vec<[usize; 2]> =
             links.numbers.iter().filter(|link| link.is_iterated()).map(Link::slots).collect();
-        let within = links.numbers.iter().filter(|link| link.is_within_the_step()).map(Link::slots);
-        let discrete = links.discrete.iter().filter(|link| link.is_within_the_step());
-        let discrete = discrete.map(|link| link.end_ids(instances).map(|(slot, _)| slot));
-        let edges: Vec<[usize; 2]> = within.chain(discrete).chain(iterated.iter().copied()).collect();
         let backwards: Vec<[usize; 2]> = edges.iter().map(|[from, to]| [*to, *from]).collect();
-        let count = instances.len();
-        let behind = reached(count, &edges, iterated.iter().map(|[_, to]| *to));
+        let behind = reached(count, edges, iterated.iter().map(|[_, to]| *to));
         let before = reached(count, &backwards, iterated.iter().map(|[from, _]| *from));
         let repeats = |slot: &usize| before[*slot] || iterated.iter().any(|[_, to]| to == slot);
         (self.members, self.followers) = (0..count).filter(|slot| behind[*slot]).partition(repeats);
-        components(count, &edges)
     }
 
     /// Those that are stepped when the loops are solved.
@@ -116,14 +145,20 @@ impl Loops {
     }
 
     /// Keeps states and values at the start of the step; the first trial is made with the values of the start.
-    pub fn begin(&mut self, links: &Links, instances: &mut [Instance]) -> Result {
+    pub fn begin(&mut self, links: &mut Links, instances: &mut [Instance]) -> Result {
         self.loops.iter_mut().for_each(|own| own.begin(links));
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
     }
 
-    /// Back to the state at the start of the step, from which a shorter one begins.
-    pub fn back(&self, instances: &mut [Instance]) -> Result {
+    /// Back to the state at the start of the step.
+    fn back(&self, instances: &mut [Instance]) -> Result {
         self.members.iter().try_for_each(|slot| instances[*slot].restore_state(self.state))
+    }
+
+    /// Back to state and values at the start of the step, from which a shorter one begins.
+    pub fn discard(&self, links: &mut Links, instances: &mut [Instance]) -> Result {
+        self.loops.iter().for_each(|own| own.back(links));
+        self.back(instances)
     }
 
     /// Repeats the trials of the members until the values no longer change. Returns a message if a loop was not solved.
@@ -142,13 +177,17 @@ impl Loops {
             if self.loops.iter().any(LoopValues::runs_away) {
                 break;
             }
+            if self.loops.iter().any(LoopValues::lags) {
+                self.loops.iter_mut().for_each(LoopValues::go_whole);
+            }
             repetitions += 1;
             self.repeat(order, span, links, subsystems)?;
         }
         Ok(Some(self.unsolved(repetitions, span, links, &subsystems.instances)))
     }
 
-    /// One trial of the members from the start of the step, with the inputs that the guess makes.
+    /// One trial of the members from the start of the step, with the inputs that the guess makes. Loops that go by quarters come first: they feed others, but
+    /// are fed by none that makes whole steps.
     fn repeat(
         &mut self,
         order: &StepOrder,
@@ -157,31 +196,37 @@ impl Loops {
         subsystems: &mut Subsystems,
     ) -> Result {
         self.back(&mut subsystems.instances)?;
-        let halving = |loops: &[LoopValues], slot: usize| {
-            loops.iter().any(|own| own.goes_by_halves() && own.members().contains(&slot))
-        };
-        let (by_halves, whole): (Vec<usize>, Vec<usize>) =
-            self.members.iter().partition(|slot| halving(&self.loops, **slot));
-        if !whole.is_empty() {
-            self.try_part(Part::Whole, &whole, order, span, links, subsystems)?;
+        let quartered: Vec<usize> =
+            self.loops.iter().filter(|own| own.goes_by_quarters()).flat_map(LoopValues::parts).collect();
+        let (by_quarters, whole): (Vec<usize>, Vec<usize>) =
+            self.members.iter().partition(|slot| quartered.contains(slot));
+        for k in (0..4).take_while(|_| !by_quarters.is_empty()) {
+            let mut quarter = span.quarter(k);
+            self.try_part(Part::Quarter(k), &by_quarters, order, &mut quarter, links, subsystems)?;
+            if quarter.broken.load(Ordering::Relaxed) {
+                return self.refuse_quarters(&by_quarters, span, subsystems);
+            }
+            if k < 3 {
+                for own in self.loops.iter_mut().filter(|own| own.goes_by_quarters()) {
+                    own.take_within(k as usize, links, &subsystems.instances)?;
+                }
+                let still = Motion { x: &[], v: &[] };
+                let mut all = by_quarters.iter();
+                all.try_for_each(|slot| subsystems.instances[*slot].commit(&quarter.step, &[], &still))?;
+            }
         }
-        if by_halves.is_empty() {
-            return Ok(());
-        }
-        let mut first = span.half(false);
-        self.try_part(Part::FirstHalf, &by_halves, order, &mut first, links, subsystems)?;
-        if first.broken.load(Ordering::Relaxed) {
+        self.try_part(Part::Whole, &whole, order, span, links, subsystems)
+    }
+
+    /// A quarter was not made: where it was discarded, the step is tried whole; a failure ends it.
+    fn refuse_quarters(&mut self, by_quarters: &[usize], span: &Span, subsystems: &mut Subsystems) -> Result {
+        let failed = |slot: &usize| matches!(subsystems.schedules[*slot].trial.as_deref(), Some(Err(_)));
+        if by_quarters.iter().any(failed) {
             span.broken.store(true, Ordering::Relaxed);
             return Ok(());
         }
-        for own in self.loops.iter_mut().filter(|own| own.goes_by_halves()) {
-            own.take_middle(links, &subsystems.instances)?;
-        }
-        let still = Motion { x: &[], v: &[] };
-        by_halves.iter().try_for_each(|slot| subsystems.instances[*slot].commit(&first.step, &[], &still))?;
-        let mut second = span.half(true);
-        self.try_part(Part::SecondHalf, &by_halves, order, &mut second, links, subsystems)?;
-        span.broken.fetch_or(second.broken.into_inner(), Ordering::Relaxed);
+        by_quarters.iter().for_each(|slot| subsystems.schedules[*slot].trial = None);
+        self.loops.iter_mut().for_each(LoopValues::go_whole);
         Ok(())
     }
 
@@ -195,9 +240,9 @@ impl Loops {
         links: &mut Links,
         subsystems: &mut Subsystems,
     ) -> Result {
-        let halves = part != Part::Whole;
-        let own = self.loops.iter().filter(|own| own.goes_by_halves() == halves);
-        own.into_iter().try_for_each(|own| own.set(part, links, &mut subsystems.instances))?;
+        let quarters = part != Part::Whole;
+        let mut own = self.loops.iter().filter(|own| own.goes_by_quarters() == quarters);
+        own.try_for_each(|own| own.set(part, links, &mut subsystems.instances))?;
         for level in 0..order.levels_before_loops() {
             span.level = level as u32;
             order.pass_on(level, |slot| members.contains(&slot), links, &mut subsystems.instances)?;
@@ -226,14 +271,35 @@ impl Loops {
         )
     }
 
-    /// Whether the outputs are those that the trial was made with; where not, a better guess is there.
+    /// Whether the outputs are those that the trial was made with; where not, a better guess is there. Loops that take values of others within the step
+    /// may stand later than those.
     fn stand(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
         let mut all = true;
         for own in &mut self.loops {
-            all &= own.stands(links, instances)?;
+            all &= own.stands(links, instances)? && !own.lags();
         }
         Ok(all)
     }
+}
+
+/// Subsystems that pass values to others within a step.
+fn edges(links: &Links, instances: &[Instance]) -> Vec<[usize; 2]> {
+    let numbers = links.numbers.iter().filter(|link| link.is_within_the_step() || link.is_iterated());
+    let discrete = links.discrete.iter().filter(|link| link.is_within_the_step());
+    let discrete = discrete.map(|link| link.end_ids(instances).map(|(slot, _)| slot));
+    numbers.map(Link::slots).chain(discrete).collect()
+}
+
+/// Why a subsystem makes no steps of a quarter of the length, if it does not.
+fn makes_no_quarters(instance: &Instance, schedule: &StepSchedule) -> Option<String> {
+    let has_clocks = || instance.variables().iter().any(|v| v.value_type == ValueType::Clock);
+    let why = match cannot_repeat(instance, schedule) {
+        Some(why) => why,
+        None if instance.capabilities().has(Capabilities::FIXED_STEP) => "makes steps of one length only",
+        None if has_clocks() => "has clocks",
+        None => return None,
+    };
+    Some(format!("`{}` {why}", instance.name()))
 }
 
 /// Why a subsystem cannot repeat a step by itself.

@@ -18,11 +18,11 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// A half of it.
-    pub fn half(&self, second: bool) -> Self {
+    /// One of four parts of it, from 0 on.
+    pub fn quarter(&self, k: u32) -> Self {
         let Self { step, end, nominal, step_s, level, .. } = *self;
-        let h = 0.5 * step.h;
-        let step = Step::free(if second { step.t + h } else { step.t }, h, step.index);
+        let h = 0.25 * step.h;
+        let step = Step::free(step.t + f64::from(k) * h, h, step.index);
         Self { step, end, nominal, step_s, level, broken: AtomicBool::new(false) }
     }
 }

@@ -71,21 +71,21 @@ impl Uncoupled {
         if !self.loops.is_empty() {
             let unsolved = self.loops.solve(&self.order, &mut span, links, subsystems)?;
             if unsolved.is_some() {
-                self.loops.back(&mut subsystems.instances)?;
+                self.discard(links, subsystems)?;
                 return Ok(unsolved);
             }
             self.advance_levels(before_loops..self.order.levels(), clock, &mut span, links, subsystems)?;
         }
         let discarded = if span.broken.into_inner() { broken_trial(subsystems)? } else { None };
         if discarded.is_some() {
-            self.loops.back(&mut subsystems.instances)?;
+            self.discard(links, subsystems)?;
         }
         Ok(discarded)
     }
 
     /// Forgets the trials of a step that glue did not converge in.
-    pub fn discard(&self, subsystems: &mut Subsystems) -> Result {
-        self.loops.back(&mut subsystems.instances)
+    pub fn discard(&self, links: &mut Links, subsystems: &mut Subsystems) -> Result {
+        self.loops.discard(links, &mut subsystems.instances)
     }
 
     /// Trials of those that take outputs of others at the end of the step, level by level.

@@ -2,6 +2,7 @@
 
 use crate::settings::Options;
 use crate::trace;
+use serde_json::{Map, Value};
 use std::sync::Arc;
 use terraglue_fmi::{Fmu, InstanceOptions, LogLine, ModelDescription};
 use terraglue_subsystem::{Error, Host, LogLevel, Result};
@@ -36,6 +37,21 @@ pub(super) fn warn(fmu: &Fmu, strict: bool, host: &dyn Host) -> Result {
     }
     warnings.iter().for_each(|warning| host.log(LogLevel::Warning, warning));
     Ok(())
+}
+
+/// Says where the description begins at another time than the run, which all its FMUs share.
+pub(super) fn warn_of_start(
+    description: &ModelDescription,
+    parameters: &Map<String, Value>,
+    host: &dyn Host,
+) {
+    let Some(start) = description.experiment.start.filter(|start| *start != 0.0) else { return };
+    if !parameters.contains_key("start_time_s") {
+        let text = format!(
+            "its description begins at t = {start} s, where `fmu run` begins, and the run at 0: `start_time_s = {start:?}` in its table gives it that time"
+        );
+        host.log(LogLevel::Warning, &text);
+    }
 }
 
 /// Says where steps of one length only are not those that the description names.

@@ -211,7 +211,15 @@ impl FmuInstance {
         if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
             last = untold(self, stop);
         }
-        let ended = self.part_end((t, stop), last, early || terminate, tolerance);
+        // continued from where it came to, it stays there: that is a time of its own solver
+        let stays = t > step.t && (last - t).abs() <= tolerance && !early && !terminate;
+        let ended = match stays {
+            true => {
+                own_time(self, last, stop);
+                PartEnd::Stop
+            }
+            false => self.part_end((t, stop), last, early || terminate, tolerance),
+        };
         let at_stop = match ended {
             PartEnd::Stop => true,
             PartEnd::Before => {

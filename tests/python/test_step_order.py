@@ -398,3 +398,119 @@ def test_a_step_that_another_discards_leaves_no_trace(tmp_path, keys, mean, isol
     # a line needs two values: the first step is held
     held = [a if k == 0 and mean == 0.5 else a + mean * (b - a) for k, (a, b) in enumerate(steps)]
     assert float(last["sum.x"]) == pytest.approx(sum(u * (b - a) for u, (a, b) in zip(held, steps)), abs=1e-14)
+
+
+def orders(errors):
+    return [math.log2(a / b) for a, b in zip(errors, errors[1:])]
+
+
+ITERATE = 'order = "iterate"\n'
+GAIN = [("u", "input", 0.0, ""), ("y", "output", 0.0, "")]
+
+
+def ended(folder, text, name):
+    (folder / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--no-report", "--out", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return float(list(csv.DictReader((folder / "out/variables.csv").open()))[-1][name])
+
+
+@pytest.mark.parametrize("link", ["", ITERATE])
+def test_a_loop_that_is_driven_from_outside_is_of_fourth_order(parts, tmp_path, link):
+    # m x'' = -k x + 100 sin 3t, at rest at first: the source is no part of the loop
+    build(tmp_path, "source", [("y", "output", 0.0, "")], "r[0] = 100.0 * sin(3.0 * (t + h));", depends="")
+    build(tmp_path, "spring", [("x", "input", 0.0, ""), ("p", "input", 0.0, ""), ("f", "output", 0.0, "")], "r[2] = r[1] - 100.0 * r[0];", depends="1 2")
+    build(tmp_path, "mass", [("f", "input", 0.0, ""), ("x", "output", 0.0, ""), ("v", "output", 0.0, "")],
+          "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    exact = 100 / (100 - 9) * (math.sin(3 * 2.0) - 0.3 * math.sin(10 * 2.0))
+    errors = []
+    for h in (0.04, 0.02, 0.01):
+        text = f"[time]\nstep_s = {h}\nduration_s = 2.0\n" + "".join(f'[{n}]\nfmu = "{n}.fmu"\n' for n in ("source", "spring", "mass"))
+        text += f'[[connect]]\nfrom = "mass.x"\nto = "spring.x"\n{ITERATE}[[connect]]\nfrom = "spring.f"\nto = "mass.f"\n{ITERATE}'
+        text += f'[[connect]]\nfrom = "source.y"\nto = "spring.p"\n{link}'
+        errors.append(abs(ended(tmp_path, text, "mass.x") - exact))
+    assert all(3.8 < order < 4.2 for order in orders(errors)), errors
+    assert "in the middle of the step, too" in json.loads((tmp_path / "out/exchange.json").read_text())["loops"][0]
+
+
+def test_a_source_without_state_makes_the_loop_whole(parts, tmp_path):
+    build(tmp_path, "source", [("y", "output", 0.0, "")], "r[0] = 100.0 * sin(3.0 * (t + h));", depends="", variable_step=False)
+    build(tmp_path, "spring", [("x", "input", 0.0, ""), ("p", "input", 0.0, ""), ("f", "output", 0.0, "")], "r[2] = r[1] - 100.0 * r[0];", depends="1 2")
+    text = "[time]\nstep_s = 0.01\nduration_s = 0.1\n" + "".join(f'[{n}]\nfmu = "{f}"\n' for n, f in (("source", "source.fmu"), ("spring", "spring.fmu"), ("mass", parts / "mass.fmu")))
+    text += f'[[connect]]\nfrom = "mass.x"\nto = "spring.x"\n{ITERATE}[[connect]]\nfrom = "spring.f"\nto = "mass.f"\n{ITERATE}[[connect]]\nfrom = "source.y"\nto = "spring.p"\n'
+    ended(tmp_path, text, "mass.x")
+    assert "at its end only, as `source` makes steps of one length" in json.loads((tmp_path / "out/exchange.json").read_text())["loops"][0]
+
+
+@pytest.mark.parametrize("gain, exact", [(-5.0, math.exp(-5.0)), (0.7, math.exp(0.7))])
+def test_a_loop_of_one_integrator_is_of_fourth_order(tmp_path, gain, exact):
+    build(tmp_path, "sum", [("u", "input", gain, ""), ("x", "output", 1.0, "")], "r[1] += h * r[0];", depends="")
+    build(tmp_path, "gain", [("u", "input", 1.0, ""), ("y", "output", gain, "")], f"r[1] = {gain} * r[0];", depends="1")
+    errors = []
+    for h in (0.1, 0.05, 0.025):
+        text = f'[time]\nstep_s = {h}\nduration_s = 1.0\n[sum]\nfmu = "sum.fmu"\n[gain]\nfmu = "gain.fmu"\n'
+        text += f'[[connect]]\nfrom = "sum.x"\nto = "gain.u"\n{ITERATE}[[connect]]\nfrom = "gain.y"\nto = "sum.u"\n{ITERATE}'
+        errors.append(abs(ended(tmp_path, text, "sum.x") - exact))
+    assert all(3.7 < order < 4.3 for order in orders(errors)), errors
+
+
+@pytest.mark.parametrize("order", ["iterate", "iterate-ends"])
+def test_the_unit_of_a_loop_does_not_matter(tmp_path, order):
+    """The same motion in m and pm, of masses of kg and Gg."""
+    ends = []
+    for size, mass in ((1.0, 1.0), (1e-12, 1.0), (1.0, 1e8)):
+        build(tmp_path, "mass", [("f", "input", -100.0 * mass * size * 0.1, ""), ("x", "output", 0.1 * size, ""), ("v", "output", 0.0, "")],
+              f"r[1] += h * r[2] + 0.5 * h * h * r[0] / {mass!r}; r[2] += h * r[0] / {mass!r};", depends="")
+        build(tmp_path, "spring", [("x", "input", 0.1 * size, ""), ("f", "output", -10.0 * mass * size, "")], f"r[1] = -100.0 * {mass!r} * r[0];", depends="1")
+        rows = sprung(tmp_path, tmp_path, 0.01, f'order = "{order}"', f'order = "{order}"')
+        ends.append([float(r["mass.x"]) / size for r in rows])
+    assert ends[1] == pytest.approx(ends[0], abs=1e-10) and ends[2] == pytest.approx(ends[0], abs=1e-10)
+
+
+def test_what_discards_a_quarter_of_a_step_is_stepped_whole(parts, tmp_path):
+    build(tmp_path, "mass", MASS, "if (h < 0.009) return 2; r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    (tmp_path / "spring.fmu").write_bytes((parts / "spring.fmu").read_bytes())
+    ends = iterated(tmp_path, tmp_path, 0.01, "iterate-ends")
+    energies, error = iterated(tmp_path, tmp_path, 0.01)
+    assert energies == pytest.approx(ends[0], abs=1e-10) and error == pytest.approx(ends[1], abs=1e-8)
+
+
+def test_a_first_step_that_is_discarded_leaves_no_trace(tmp_path):
+    # clock -> gain -> sum, which makes no step longer than 7 ms
+    build(tmp_path, "clock", [("y", "output", 0.0, "")], "r[0] = t + h;", depends="")
+    build(tmp_path, "gain", GAIN, "r[1] = r[0];", depends="1")
+    build(tmp_path, "sum", GAIN, "if (h > 0.007) return 2; r[1] += h * r[0];", depends="")
+    text = "[time]\nstep_s = 0.01\nduration_s = 0.02\n" + "".join(f'[{n}]\nfmu = "{n}.fmu"\n' for n in ("clock", "gain", "sum"))
+    text += '[[connect]]\nfrom = "clock.y"\nto = "gain.u"\n[[connect]]\nfrom = "gain.y"\nto = "sum.u"\n'
+    # each half begins with the value of its start
+    assert ended(tmp_path, text, "sum.y") == pytest.approx(0.005 * (0.0 + 0.005 + 0.01 + 0.015), abs=1e-15)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-5, 1e-9, 1e6])
+def test_start_values_of_mixed_units_are_solved(tmp_path, size):
+    build(tmp_path, "a", GAIN, "", depends="1", more=f"int fmi2GetReal(Fmu *u, const unsigned *r, size_t n, double *x) {{ u->r[1] = {size!r} * (1.0 + u->r[0]); while (n--) x[n] = u->r[r[n]]; return 0; }}", instead=("fmi2GetReal",))
+    build(tmp_path, "b", GAIN, "", depends="1", more=f"int fmi2GetReal(Fmu *u, const unsigned *r, size_t n, double *x) {{ u->r[1] = 1.0 - 0.5 / {size!r} * u->r[0]; while (n--) x[n] = u->r[r[n]]; return 0; }}", instead=("fmi2GetReal",))
+    text = '[time]\nstep_s = 0.1\nduration_s = 0.1\n[a]\nfmu = "a.fmu"\n[b]\nfmu = "b.fmu"\n[[connect]]\nfrom = "a.y"\nto = "b.u"\n[[connect]]\nfrom = "b.y"\nto = "a.u"\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--no-report", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    first = next(csv.DictReader((tmp_path / "out/variables.csv").open()))
+    # a = s (1 + b), b = 1 - a / 2 s
+    assert float(first["b.y"]) == pytest.approx(1 / 3, rel=1e-11) and float(first["a.y"]) / size == pytest.approx(4 / 3, rel=1e-11)
+
+
+def test_an_fmu_alone_and_in_a_scenario_makes_the_same_steps(tmp_path):
+    fmu = build(tmp_path, "oscillator", [("x", "output", 1.0, ""), ("v", "output", 0.0, "")], "r[0] += h * r[1]; r[1] -= h * r[0] * 25.0;", depends="")
+    for step in (0.001, 0.0007):
+        alone = terraglue("fmu", "run", fmu, "--stop", "0.7", "--step", step, "--csv", "alone.csv", cwd=tmp_path)
+        assert alone.returncode == 0, alone.stderr
+        last = list(csv.DictReader((tmp_path / "alone.csv").open()))[-1]
+        assert ended(tmp_path, f'[time]\nstep_s = {step}\nduration_s = 0.7\n[a]\nfmu = "oscillator.fmu"\n', "a.x") == float(last["x"])
+
+
+def test_an_fmu_that_crashes_alone_is_named(tmp_path):
+    fmu = build(tmp_path, "crashes", [("y", "output", 0.0, "")], "if (t > 0.5) *(volatile int *)0 = 1; r[0] = t;", depends="")
+    done = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.1", "--csv", "rows.csv", cwd=tmp_path)
+    assert done.returncode == -11 and "segmentation fault" in done.stderr and "`crashes.fmu`" in done.stderr and "--isolate" in done.stderr, done.stderr
+    kept = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.1", "--isolate", cwd=tmp_path)
+    assert kept.returncode == 1 and "crashed:" not in kept.stderr

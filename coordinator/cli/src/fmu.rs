@@ -14,6 +14,7 @@ use terraglue_fmi::instance::Trace;
 use terraglue_fmi::{Error as FmiError, Fmu};
 use terraglue_fmu::simulate::{self, Settings, Table, Tables};
 use terraglue_fmu::{references, trace};
+use terraglue_host::crash::Beginning;
 use terraglue_host::isolation::confine;
 use terraglue_scenario::InputError;
 
@@ -63,6 +64,8 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let tables: Vec<TableFile> = [&file, &between].into_iter().flatten().cloned().collect();
     let _exit_hook = table_file::exit_hook(&arguments.fmu, tables.clone());
     let mut report = apart::Report::of_child();
+    // a worker's crash is told by the process that waits for it
+    let _crash = report.is_none().then(|| Beginning::of_run(&arguments.fmu));
     let mut row = |text: &str| {
         if stopped.load(Ordering::Relaxed) {
             return Err(FmiError::Refused("stopped".into()));

@@ -34,6 +34,9 @@ struct LastCall {
     time_s: f64,
 }
 
+/// What stands for the functions of an FMU that is run alone.
+const RUN: &str = "fmu run";
+
 const NONE: LastCall = LastCall { names: ptr::null(), function: "", time_s: 0.0 };
 
 thread_local! {
@@ -62,6 +65,12 @@ impl Beginning {
     /// Code of a module's file runs while it is loaded.
     pub(super) fn of_file(file: &Path, function: &'static str) -> Self {
         Self::new("", file, function)
+    }
+
+    /// An FMU is run alone: `terraglue fmu run`.
+    pub fn of_run(file: &Path) -> Self {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        Self::new(&name, file, RUN)
     }
 
     fn new(instance: &str, file: &Path, function: &'static str) -> Self {
@@ -170,6 +179,12 @@ fn report(index: usize, names: &Names, call: &LastCall) {
         put(".");
         put(decimal(micros % 1_000_000, 6, &mut room));
         put(" s");
+    }
+    if call.function == RUN {
+        put(
+            ".\n  help: --isolate keeps it in a process of its own: its crash is an error then, and the rows are complete\n",
+        );
+        return;
     }
     put(".\n  help: `isolate = true` in [");
     put(&names.instance);

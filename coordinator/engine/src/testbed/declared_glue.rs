@@ -37,8 +37,24 @@ pub(super) fn declared(scenario: &Scenario, instances: &mut [Instance]) -> Resul
             let error = scenario.source.error_in(spec.entry, &[&spec.sides[1]], message, Some(help));
             return Err(error.into());
         }
+        warn_of_speeds(recipe, spec, &states);
     }
     Ok(glue)
+}
+
+/// Says where the points of a joint meet at the start, and go on at different speeds: the first step makes them equal by an impulse.
+fn warn_of_speeds(recipe: &Recipe, spec: &GlueSpec, states: &[Vec<BodyState>]) {
+    let speed = |state: &BodyState| state.linear_velocity;
+    let scale = recipe.ends.iter().flatten().map(|(slot, body)| &states[*slot][*body as usize]);
+    let scale = scale.map(|state| rotation::length(speed(state))).fold(1e-3, f64::max);
+    let apart = rotation::length(apart_at_start(recipe, states, speed));
+    if is_rigid(recipe) && recipe.at.is_none() && apart > GAP * scale {
+        let [a, b] = &spec.sides;
+        log::warn!(
+            "glue: `{a}` and `{b}` differ by {apart:.3} m/s at the start, which the first step makes equal by an impulse: bodies whose force is held over a step may \
+             then swap their speeds in every step. Give them the same speed"
+        );
+    }
 }
 
 /// Moves a free body of side 1, or else of side 2, with all that hangs on it, so that the points of a joint meet.
@@ -140,23 +156,37 @@ fn recipes(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
 /// From the point of side 2 to that of side 1 of a joint without compliance and ramp, at the start along the components that it
 /// glues, m, world axes; none: they are apart by rounding only.
 fn gap_at_start(recipe: &Recipe, states: &[Vec<BodyState>]) -> Option<[f64; 3]> {
-    if recipe.contact || recipe.law.compliance > 0.0 || recipe.ramp_s > 0.0 || recipe.at.is_some() {
+    if !is_rigid(recipe) || recipe.ramp_s > 0.0 || recipe.at.is_some() {
         return None;
     }
-    let place = |e: usize| {
-        let state = recipe.ends[e].map_or(BodyState::REST, |(slot, body)| states[slot][body as usize]);
-        state.world_from_body.position
-    };
-    let [a, b] = [place(0), place(1)];
-    let along = |axis: usize| (0..3).map(|k| recipe.axes[3 * axis + k] * (a[k] - b[k])).sum::<f64>();
-    let glued = (0..3).filter(|axis| recipe.mask & (1 << axis) != 0);
-    let mut gap = [0.0; 3];
-    for axis in glued {
-        let size = along(axis);
-        gap.iter_mut().enumerate().for_each(|(k, gap)| *gap += size * recipe.axes[3 * axis + k]);
-    }
-    let scale = a.iter().chain(&b).fold(1.0_f64, |m, x| m.max(x.abs()));
+    let place = |state: &BodyState| state.world_from_body.position;
+    let ends = recipe.ends.iter().flatten().map(|(slot, body)| place(&states[*slot][*body as usize]));
+    let scale = ends.flatten().fold(1.0_f64, |m, x| m.max(x.abs()));
+    let gap = apart_at_start(recipe, states, place);
     (rotation::length(gap) > GAP * scale).then_some(gap)
+}
+
+/// Whether it lets its points come apart by rounding only.
+fn is_rigid(recipe: &Recipe) -> bool {
+    !recipe.contact && recipe.law.compliance <= 0.0
+}
+
+/// What side 1 has more than side 2 of a vector of bodies, along the components that are glued, world axes.
+fn apart_at_start(
+    recipe: &Recipe,
+    states: &[Vec<BodyState>],
+    of: impl Fn(&BodyState) -> [f64; 3],
+) -> [f64; 3] {
+    let end =
+        |e: usize| of(recipe.ends[e].map_or(&BodyState::REST, |(slot, body)| &states[slot][body as usize]));
+    let apart = rotation::minus(end(0), end(1));
+    let mut out = [0.0; 3];
+    for axis in (0..3).filter(|axis| recipe.mask & (1 << axis) != 0) {
+        let along: [f64; 3] = std::array::from_fn(|k| recipe.axes[3 * axis + k]);
+        let size = rotation::dot(along, apart);
+        out.iter_mut().zip(along).for_each(|(out, d)| *out += size * d);
+    }
+    out
 }
 
 /// Gap at the start that is rounding, as a share of the places of the two bodies, or in m where these are below 1 m.

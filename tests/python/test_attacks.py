@@ -197,7 +197,7 @@ COMMANDS = [
     ("check-module soil-bekker --set nothing=1 --only loads", 2, "nothing"), ("check-module soil-bekker --time-limit 0", 2, "--time-limit"),
     ("robot {}/text.txt", 2, "text.txt"), ("robot {}/none.urdf", 2, "none.urdf"), ("variables {walk} nothing.at.all", 2, "nothing.at.all"),
     ("variables {walk} --module-path {}/none", 2, "/none"), ("report {}/none", 2, "none"), ("export {walk} -o {}/x.fmu --fmi 4", 2, "4"),
-    ("export {walk}", 2, "--output"), ("compare {walk} --vary soil.n", 2, "--vary"), ("compare {walk} --vary soil.n=1,,2", 2, "a value is empty"),
+    ("compare {walk} --vary soil.n", 2, "--vary"), ("compare {walk} --vary soil.n=1,,2", 2, "a value is empty"),
     ("compare {walk} --steps -1", 2, "step_s"), ("compare {walk} --reference-step 1e-3", 2, "--reference"), ("new scenario x", 2, "--robot"),
     ("run {walk} --checkpoint-every x", 2, "--checkpoint-every"), ("run --resume {}", 2, "checkpoint"), ("soils {}/x moon", 2, "moon"),
 ]

@@ -251,9 +251,9 @@ pub struct ExportArguments {
     /// A scenario file (TOML) or the name of a module.
     #[arg(value_name = "MODULE|SCENARIO")]
     pub target: String,
-    /// The FMU to write.
+    /// The FMU to write [default: the name of the module or scenario, here].
     #[arg(short, long, value_name = "FILE.fmu")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
     /// Version of the standard.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(2..=3))]
     pub fmi: u8,

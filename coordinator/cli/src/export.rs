@@ -5,6 +5,7 @@ use super::arguments::ExportArguments;
 use super::output::outln;
 use super::words::DATE;
 use chrono::DateTime;
+use std::path::{Path, PathBuf};
 use terraglue_fmi::Version;
 use terraglue_fmi::export::Origin;
 use terraglue_fmu::export::{Request, write};
@@ -13,6 +14,12 @@ use terraglue_fmu::export::{Request, write};
 fn source_date() -> Option<String> {
     let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
     Some(DateTime::from_timestamp(seconds, 0)?.format(DATE).to_string())
+}
+
+/// The FMU of a module or a scenario where no file is named.
+fn named(target: &str) -> PathBuf {
+    let name = Path::new(target).file_stem().unwrap_or_default();
+    Path::new(name).with_extension("fmu")
 }
 
 /// Writes the FMU and says what it can do.
@@ -29,7 +36,7 @@ pub fn export(arguments: &ExportArguments) -> terraglue_diagnostics::Result<Exit
             date: arguments.date.clone().or_else(source_date),
         },
         reference: !arguments.no_reference,
-        out: arguments.output.clone(),
+        out: arguments.output.clone().unwrap_or_else(|| named(&arguments.target)),
     })?;
     let states = match exported.states {
         [true, true] => "its state can be saved, restored and serialised",

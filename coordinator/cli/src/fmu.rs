@@ -91,12 +91,10 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     }
     match ran {
         Ok(ended) => {
-            ended.iter().for_each(|t| {
-                eprintln!(
-                    "note: {}: the FMU asked for the end of the run at t = {t} s",
-                    arguments.fmu.display()
-                );
-            });
+            let name = arguments.fmu.display();
+            ended
+                .iter()
+                .for_each(|t| eprintln!("note: {name}: the FMU asked for the end of the run at t = {t} s"));
             Ok(Exit::Done)
         }
         Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),

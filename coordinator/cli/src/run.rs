@@ -8,6 +8,7 @@ use super::pace::Pace;
 use super::progress::{self, Progress, Waiting};
 use super::testbed::{build, options, set_back};
 use super::{Exit, apart, exit_of, points, serve, show, soil_module, strict};
+use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terraglue_checkpoint::{Checkpoint, Keeper, Resumed, require_states};
@@ -50,10 +51,10 @@ impl Outcome {
 /// Runs a scenario as the arguments say.
 pub fn run(command: &RunCommand) -> Result<Exit> {
     let arguments = &command.run;
-    command.points.as_deref().map(points::check).transpose()?;
     let interrupt = Interrupt::listen();
     let mut options = options(arguments, &interrupt.flag());
     let checkpoint = command.resume.as_deref().map(|folder| resumable(folder, &mut options)).transpose()?;
+    command.points.as_deref().map(points::check).transpose()?;
     let scenario = scenario(command, checkpoint.as_ref(), &options)?;
     if command.serve {
         return serve::run(command, &scenario, &interrupt);
@@ -101,16 +102,20 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
         say(arguments, &show::costs(&outcome.costs, outcome.summary.steps).to_string());
     }
     print(arguments, &outcome, report.as_ref().ok().and_then(Option::as_deref))?;
-    if let Some(path) = &command.points {
-        let waiting = Waiting::new(arguments.quiet, bar.clone(), || "points are written".into());
-        let count = points::write(&folder, path)?;
-        drop(waiting);
-        say(arguments, &format!("points: {} ({count} points)", path.display()));
-    }
+    command.points.as_deref().map(|path| write_points(arguments, &bar, &folder, path)).transpose()?;
     if every_s.is_some() && outcome.summary.status == Status::Stopped && !arguments.quiet {
         eprintln!("`terraglue run --resume {}` goes on from here", folder.display());
     }
     ended(report, &outcome, &folder)
+}
+
+/// Writes what the scanners of a run have seen.
+fn write_points(arguments: &RunArguments, bar: &ProgressBar, folder: &Path, path: &Path) -> Result {
+    let waiting = Waiting::new(arguments.quiet, bar.clone(), || "points are written".into());
+    let count = points::write(folder, path)?;
+    drop(waiting);
+    say(arguments, &format!("points: {} ({count} points)", path.display()));
+    Ok(())
 }
 
 /// The scenario of a run, or of the one that goes on.

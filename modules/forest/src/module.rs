@@ -124,18 +124,7 @@ impl Forest {
     /// [`Error::Refused`]: more plants than a stand holds.
     pub fn new(config: &Config, host: &dyn Host) -> Result<Self> {
         let of = |key: &str| config.number(key);
-        let growth = Growth {
-            per_hectare: of("per_hectare")?,
-            half_m: of("half_m")?,
-            apart_m: of("apart_m")?,
-            diameter_m: of("diameter_m")?,
-            shape: of("shape")?,
-            lean: of("lean")?,
-            spruces: of("spruces")?,
-            bushes_per_hectare: of("bushes_per_hectare")?,
-            clearing_m: of("clearing_m")?,
-            terrain: Formula::default(),
-        };
+        let growth = growth(config)?;
         let plants_wanted =
             4e-4 * growth.half_m * growth.half_m * (growth.per_hectare + growth.bushes_per_hectare);
         if !(plants_wanted <= MOST_PLANTS) {
@@ -190,6 +179,23 @@ impl Forest {
     pub fn stand(&self) -> &Stand {
         &self.stand
     }
+}
+
+/// How a stand grows.
+fn growth(config: &Config) -> Result<Growth> {
+    let of = |key: &str| config.number(key);
+    Ok(Growth {
+        per_hectare: of("per_hectare")?,
+        half_m: of("half_m")?,
+        apart_m: of("apart_m")?,
+        diameter_m: of("diameter_m")?,
+        shape: of("shape")?,
+        lean: of("lean")?,
+        spruces: of("spruces")?,
+        bushes_per_hectare: of("bushes_per_hectare")?,
+        clearing_m: of("clearing_m")?,
+        terrain: Formula::default(),
+    })
 }
 
 /// The stand of a table, with bushes from the seed.

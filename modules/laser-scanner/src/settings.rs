@@ -32,7 +32,6 @@ pub fn schema() -> Schema {
     let share =
         |name: &str, default: f64, help: &str| Parameter::number(name, "", default, help).within(0.0, 1.0);
     let [line, vlp, os1] = Pattern::NAMES;
-    let [strongest, first, last] = Returns::NAMES;
     let pattern = Parameter::of(
         "pattern",
         ParameterType::Text,
@@ -66,6 +65,21 @@ pub fn schema() -> Schema {
             0.0,
             "Increase of `drop_out` along a surface, by the square of 1 − cosine of incidence",
         ),
+        Parameter::of("sees_own_body", ParameterType::Bool, "Whether rays meet the body that it sits on")
+            .or(false),
+    ];
+    let parameters = parameters.into_iter().chain(of_beam()).collect();
+    let help = "Laser scanner that turns: points of every ray at its own time and pose, with noise, drop-out and faults";
+    Schema { name: "laser-scanner".into(), kind: Kind::Sensor, help: help.into(), parameters }
+}
+
+/// Parameters of the extent of a beam and of its returns.
+fn of_beam() -> Vec<Parameter> {
+    let [strongest, first, last] = Returns::NAMES;
+    let part = |name: &str, unit: &str, default: f64, help: &str| {
+        Parameter::number(name, unit, default, help).within(0.0, f64::INFINITY)
+    };
+    vec![
         part(
             "divergence_rad",
             "rad",
@@ -79,7 +93,8 @@ pub fn schema() -> Schema {
             0.6,
             "Surfaces that are nearer to each other along a beam come back as one point",
         ),
-        share("threshold", 0.0, "Least share of the light that must come back for a point"),
+        Parameter::number("threshold", "", 0.0, "Least share of the light that must come back for a point")
+            .within(0.0, 1.0),
         Parameter::of(
             "returns",
             ParameterType::Text,
@@ -87,11 +102,7 @@ pub fn schema() -> Schema {
         )
         .or(strongest)
         .choices(&[strongest, first, last]),
-        Parameter::of("sees_own_body", ParameterType::Bool, "Whether rays meet the body that it sits on")
-            .or(false),
-    ];
-    let help = "Laser scanner that turns: points of every ray at its own time and pose, with noise, drop-out and faults";
-    Schema { name: "laser-scanner".into(), kind: Kind::Sensor, help: help.into(), parameters }
+    ]
 }
 
 impl Settings {

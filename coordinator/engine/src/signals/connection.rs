@@ -33,8 +33,8 @@ pub struct Link {
     numbers: Vec<f64>,
     /// The line that the inputs follow, where they are not held.
     extrapolation: Option<Box<Extrapolation>>,
-    /// Largest magnitude that each value has had in the run, where it is iterated.
-    largest: Option<Box<Vec<f64>>>,
+    /// Largest magnitude that each value has had in the run; empty where none is iterated.
+    largest: Vec<f64>,
 }
 
 /// Derivatives of all values of `links`, one behind the other, by an entry of the inputs that a link feeds; false where one is not known.
@@ -133,13 +133,13 @@ impl Link {
     /// For a snapshot.
     pub fn remember(&self, out: &mut Vec<u64>) {
         self.extrapolation.iter().for_each(|line| line.remember(out));
-        self.largest.iter().flat_map(|all| all.iter()).for_each(|x| out.push(x.to_bits()));
+        out.extend(self.largest.iter().map(|x| x.to_bits()));
     }
 
     /// Back to a snapshot.
     pub fn recall(&mut self, kept: &mut Recall) {
         self.extrapolation.iter_mut().for_each(|line| line.recall(kept));
-        self.largest.iter_mut().flat_map(|all| all.iter_mut()).for_each(|x| *x = kept.number());
+        self.largest.iter_mut().for_each(|x| *x = kept.number());
     }
 
     /// Values of the outputs, in the units of the inputs.
@@ -218,14 +218,12 @@ impl Link {
 
     /// Notes how large the values are that were read last.
     pub fn learn(&mut self) {
-        let n = self.count();
-        let Some(largest) = &mut self.largest else { return };
-        largest.iter_mut().zip(&self.numbers[..n]).for_each(|(most, x)| *most = most.max(x.abs()));
+        self.largest.iter_mut().zip(&self.numbers).for_each(|(most, x)| *most = most.max(x.abs()));
     }
 
     /// Largest magnitude that a value has had in the run, where it is iterated.
     pub fn largest(&self, k: usize) -> f64 {
-        self.largest.as_ref().and_then(|all| all.get(k).copied()).unwrap_or(0.0)
+        self.largest.get(k).copied().unwrap_or(0.0)
     }
 
     /// Whether it leaves a subsystem of some kind.
@@ -522,7 +520,7 @@ impl Resolving<'_> {
             let line = || Extrapolation::new(multiples, by_derivatives);
             let extrapolation = (extrapolate != Extrapolate::Constant).then(|| Box::new(line()));
             let (ids, numbers) = (Vec::new(), Vec::new());
-            let (within, largest) = (false, order.repeats().then(Box::default));
+            let (within, largest) = (false, Vec::new());
             let (from, to) = (from.slot, to.slot);
             links.push(Link { from, to, order, within, ids, numbers, extrapolation, largest });
             links.len() - 1
@@ -535,7 +533,9 @@ impl Resolving<'_> {
         link.numbers.push(conversion.1);
         link.numbers.insert(2 * n, conversion.0);
         link.numbers.insert(n, 0.0);
-        link.largest.iter_mut().for_each(|all| all.push(0.0));
+        if link.is_iterated() {
+            link.largest.push(0.0);
+        }
     }
 }
 

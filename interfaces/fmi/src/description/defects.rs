@@ -162,6 +162,9 @@ fn start_range(_: &ModelDescription, v: &Variable) -> Option<String> {
     let bounds = || format!("outside its range from {} to {}", v.min, v.max);
     match &v.start {
         Start::Numbers(numbers) => {
+            if numbers.iter().any(|x| x.is_nan()) {
+                return Some("has the start value NaN, which is no number".into());
+            }
             let single = v.value_type == ValueType::F32;
             let large = |x: &&f64| single && !holds_single(**x);
             if let Some(x) = numbers.iter().find(large) {

@@ -31,6 +31,8 @@ pub struct FmuSubsystem {
     open: bool,
     /// Whether the initialisation is over.
     running: bool,
+    /// Whether it has been initialised, if only before it went back.
+    begun: bool,
     /// Whether any variable is a clock or belongs to one.
     clocks: bool,
     can_go_back: bool,
@@ -44,7 +46,8 @@ pub struct FmuSubsystem {
     before: FmuState,
     /// Whether it was seen that the FMU comes back to a saved state.
     proved: bool,
-    slots: Vec<FmuState>,
+    /// States that are kept, each with whether the FMU is initialised in it.
+    slots: Vec<(FmuState, bool)>,
     on_nan: OnNan,
     warned: Cell<bool>,
     references: RefCell<Vec<u32>>,
@@ -88,8 +91,9 @@ impl FmuSubsystem {
             can_go_back: capabilities.state && options.rollback,
             open: false,
             running: false,
+            begun: false,
             proved: false,
-            slots: (0..host.slots()).map(|_| FmuState::default()).collect(),
+            slots: (0..host.slots()).map(|_| Default::default()).collect(),
             kept: Cell::new(false),
             on_nan: options.on_nan,
             warned: Cell::new(false),
@@ -243,7 +247,9 @@ impl FmuSubsystem {
         if begins {
             self.instance.exit_initialization().map_err(error)?;
             self.running = true;
-            opening::warn_of_length(self.instance.description(), step.h, &*self.host);
+            if !std::mem::replace(&mut self.begun, true) {
+                opening::warn_of_length(self.instance.description(), step.h, &*self.host);
+            }
         }
         if step.h == 0.0 && self.has_bodies {
             self.bodies.still(&mut self.instance, step, wrench, out, error)?;
@@ -469,14 +475,15 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
-        let state = self.slots.get_mut(slot as usize).ok_or(Error::Unsupported)?;
+        let (state, running) = self.slots.get_mut(slot as usize).ok_or(Error::Unsupported)?;
         self.kept.set(true);
+        *running = self.running;
         self.instance.save(state).map_err(error)
     }
 
     fn restore_state(&mut self, slot: u32) -> Result {
-        let state = self.slots.get(slot as usize).ok_or(Error::Unsupported)?;
-        self.open = false;
+        let (state, running) = self.slots.get(slot as usize).ok_or(Error::Unsupported)?;
+        (self.open, self.running) = (false, *running);
         self.instance.restore(state).map_err(error)
     }
 
@@ -636,7 +643,7 @@ impl FmuSubsystem {
 
 impl Drop for FmuSubsystem {
     fn drop(&mut self) {
-        for state in self.slots.iter_mut().chain([&mut self.before]) {
+        for state in self.slots.iter_mut().map(|(state, _)| state).chain([&mut self.before]) {
             // The instance goes next; what it says to this is in its log.
             drop(self.instance.release(state));
         }

@@ -94,6 +94,17 @@ impl Link {
         }
     }
 
+    /// The same over one of four quarters of the step, from 0 on.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem refuses the values or fails.
+    pub fn pass_on_quarter(&self, k: u32, instances: &mut [Instance]) -> Result {
+        match self.extrapolation.as_ref().and_then(|line| line.over_quarter(k)) {
+            None => Ok(()),
+            Some(values) => self.write(instances, &values),
+        }
+    }
+
     /// Goes on along the line of the values, where there is one.
     ///
     /// # Errors

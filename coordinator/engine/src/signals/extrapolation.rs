@@ -129,6 +129,17 @@ impl Extrapolation {
         (!self.ahead.is_empty()).then_some(&self.ahead)
     }
 
+    /// The same over one of four quarters of the step, from 0 on.
+    pub fn over_quarter(&self, k: u32) -> Option<Vec<f64>> {
+        let k = f64::from(k);
+        let ends = self.takes_end.iter().copied().chain(std::iter::repeat(false));
+        // `ahead` is the end of the line, or its middle
+        let along = |((start, ahead), takes_end): ((&f64, &f64), bool)| {
+            start + (ahead - start) * if takes_end { 0.25 * (k + 1.0) } else { 0.5 * (k + 0.5) }
+        };
+        (!self.ahead.is_empty()).then(|| self.start.iter().zip(&self.ahead).zip(ends).map(along).collect())
+    }
+
     /// For a snapshot.
     pub fn remember(&self, out: &mut Vec<u64>) {
         out.put(self.last_s);

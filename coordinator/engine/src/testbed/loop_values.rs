@@ -52,16 +52,20 @@ pub(super) struct LoopValues {
     members: Vec<usize>,
     /// Subsystems that feed it within the step and are no part of it.
     sources: Vec<usize>,
+    /// Whether an input of it is integrated: only then quarters are worth it.
+    integrates: bool,
     /// Why trials are whole steps; empty: they are made of quarters.
     why_whole: String,
+    /// Connections whose values are looked at: those that are iterated, then those that pass outputs of its parts on within the step.
+    watched: Vec<usize>,
     /// Whether trials of this step are made of quarters.
     by_quarters: bool,
     /// Values at the start of the step.
     start: Vec<f64>,
     /// Values that the trial was made with: at the end of the step and, by quarters, then those in the middle.
     guess: Vec<f64>,
-    /// Outputs after each of the first three quarters of the trial.
-    within: [Vec<f64>; 3],
+    /// Values of the watched connections at the start, after each of the first three quarters of the trial and at its end.
+    seen: [Vec<f64>; 5],
     /// Whether a subsystem did not move in a quarter of the trial, but in the step.
     lags: bool,
     /// Largest difference relative to the largest value at the last trial.
@@ -95,20 +99,25 @@ impl LoopValues {
         let integrates = own.iter().any(|i| i.takes_end.contains(&false));
         let why_whole = match members.iter().chain(&sources).find_map(|slot| cannot(*slot)) {
             _ if at_ends => "as `iterate-ends` asks".to_owned(),
-            _ if !integrates => "as outputs follow all its values at once".to_owned(),
             Some(why) => format!("as {why}"),
             None => String::new(),
         };
+        let is_part = |slot: usize| members.contains(&slot) || sources.contains(&slot);
+        let passed = links.numbers.iter().enumerate();
+        let passed = passed.filter(|(_, link)| link.is_within_the_step() && is_part(link.slots()[0]));
+        let watched = own.iter().map(|i| i.link).chain(passed.map(|(k, _)| k)).collect();
         Self {
             newton,
             links: own,
             members,
             sources,
+            integrates,
             why_whole,
+            watched,
             by_quarters: false,
             start: Vec::new(),
             guess: Vec::new(),
-            within: Default::default(),
+            seen: Default::default(),
             lags: false,
             off: f64::INFINITY,
             stuck: 0,
@@ -123,9 +132,14 @@ impl LoopValues {
         self.members.iter().chain(&self.sources).copied()
     }
 
-    /// Whether its steps are always whole.
-    pub fn is_whole(&self) -> bool {
-        !self.why_whole.is_empty()
+    /// Whether an input of it is integrated.
+    pub fn integrates(&self) -> bool {
+        self.integrates
+    }
+
+    /// Whether its steps are always whole, and why.
+    pub fn why_whole(&self) -> Option<&str> {
+        (!self.why_whole.is_empty()).then_some(&self.why_whole)
     }
 
     /// Makes its steps whole, for a reason.
@@ -158,7 +172,10 @@ impl LoopValues {
     }
 
     /// Keeps the values at the start of the step; the first trial is a whole step that is made with them.
-    pub fn begin(&mut self, links: &mut Links) {
+    ///
+    /// # Errors
+    /// A value that a subsystem cannot give.
+    pub fn begin(&mut self, links: &mut Links, instances: &[Instance]) -> Result {
         self.start.clear();
         for own in &self.links {
             let link = &mut links.numbers[own.link];
@@ -166,9 +183,16 @@ impl LoopValues {
             self.start.extend((0..link.count()).map(|k| link.value(k)));
         }
         self.guess.clone_from(&self.start);
+        if self.why_whole.is_empty() {
+            read(&self.watched[self.links.len()..], links, instances, &mut self.seen[1])?;
+            let Self { start, seen: [first, passed, ..], .. } = self;
+            first.clone_from(start);
+            first.extend_from_slice(passed);
+        }
         (self.by_quarters, self.lags, self.off, self.stuck) = (false, false, f64::INFINITY, 0);
         self.scale.clear();
         self.acceleration.begin();
+        Ok(())
     }
 
     /// Makes the connections show the values at the start of the step.
@@ -188,23 +212,31 @@ impl LoopValues {
         self.acceleration.begin();
     }
 
-    /// Takes the outputs after one of the first three quarters of a trial.
+    /// Takes the outputs after one of the first three quarters of a trial, from 0 on.
+    ///
+    /// # Errors
+    /// A value that a subsystem cannot give.
     pub fn take_within(&mut self, quarter: usize, links: &mut Links, instances: &[Instance]) -> Result {
-        read(&self.links, links, instances, &mut self.within[quarter])
+        read(&self.watched, links, instances, &mut self.seen[quarter + 1])
     }
 
     /// Whether the outputs are those that the trial was made with; if not, a better guess is there.
+    ///
+    /// # Errors
+    /// A value that a subsystem cannot give.
     pub fn stands(&mut self, links: &mut Links, instances: &[Instance]) -> Result<bool> {
+        let n = self.start.len();
+        let watched = if self.by_quarters { &self.watched[..] } else { &self.watched[..self.links.len()] };
+        read(watched, links, instances, &mut self.seen[4])?;
         let (own, residual) = (&self.links, self.acceleration.residual());
-        read(own, links, instances, residual)?;
+        residual.clear();
+        residual.extend_from_slice(&self.seen[4][..n]);
         let first = self.scale.is_empty();
         if first {
             own.iter().for_each(|i| links.numbers[i.link].learn());
         }
         if self.by_quarters {
-            let [a, b, c] = &self.within;
-            self.lags = lags(own, links, [&self.start, a, b, c, residual]);
-            residual.extend_from_slice(b);
+            residual.extend_from_slice(&self.seen[2][..n]);
         }
         let largest: Vec<f64> = own
             .iter()
@@ -224,14 +256,15 @@ impl LoopValues {
             *value -= guess;
         }
         self.missed.clone_from(residual);
-        self.stuck = if off > 0.5 * self.off { self.stuck + 1 } else { 0 };
-        self.off = off;
-        if off <= TOLERANCE || (is_small && self.stuck >= STUCK) {
-            return Ok(true);
-        }
         if first {
             let sizes = self.guess.iter().zip(&*residual).map(|(u, r)| u.abs().max((u + r).abs()).max(1.0));
             self.scale.extend(sizes);
+        }
+        self.stuck = if off > 0.5 * self.off { self.stuck + 1 } else { 0 };
+        self.off = off;
+        if off <= TOLERANCE || (is_small && self.stuck >= STUCK) {
+            self.lags = self.by_quarters && lags(watched, links, &self.seen);
+            return Ok(true);
         }
         self.newton.solve(residual, links, instances)?;
         // values of different units count alike
@@ -241,14 +274,14 @@ impl LoopValues {
         let scaled: Vec<f64> = self.guess.iter().zip(units()).map(|(guess, unit)| guess / unit).collect();
         let step = self.acceleration.step(&scaled);
         self.guess.iter_mut().zip(step).zip(units()).for_each(|((guess, d), unit)| *guess += d * unit);
-        if first && self.why_whole.is_empty() {
-            self.begin_quarters();
-        }
         Ok(false)
     }
 
-    /// From now on by quarters; the first guess of the middle is the mean of start and end.
-    fn begin_quarters(&mut self) {
+    /// From now on by quarters, where it can; the first guess of the middle is the mean of start and end.
+    pub fn begin_quarters(&mut self) {
+        if !self.why_whole.is_empty() {
+            return;
+        }
         self.by_quarters = true;
         self.guess.extend_from_within(..);
         let n = self.start.len();
@@ -307,20 +340,20 @@ impl LoopValues {
     }
 }
 
-/// Outputs as they are.
-fn read(own: &[Iterated], links: &mut Links, instances: &[Instance], out: &mut Vec<f64>) -> Result {
+/// Outputs as they are, of some connections.
+fn read(numbers: &[usize], links: &mut Links, instances: &[Instance], out: &mut Vec<f64>) -> Result {
     out.clear();
-    for i in own {
-        out.extend_from_slice(links.numbers[i.link].read(instances)?);
+    for k in numbers {
+        out.extend_from_slice(links.numbers[*k].read(instances)?);
     }
     Ok(())
 }
 
-/// Whether a subsystem leaves all its outputs as they are over a quarter of a step that changes them: it has a solver step of its own that is longer than a
-/// quarter, so its outputs within the step are not those of their times.
-fn lags(own: &[Iterated], links: &Links, values: [&[f64]; 5]) -> bool {
-    let ranges = own.iter().scan(0, |first, i| {
-        let link = &links.numbers[i.link];
+/// Whether a subsystem leaves all its outputs as they are over a quarter of a step, and changes them in a later one: it has a solver step of its own that is longer
+/// than a quarter, so its outputs within the step are not those of their times.
+fn lags(numbers: &[usize], links: &Links, values: &[Vec<f64>; 5]) -> bool {
+    let ranges = numbers.iter().scan(0, |first, k| {
+        let link = &links.numbers[*k];
         let range = *first..*first + link.count();
         *first = range.end;
         Some((link.slots()[0], range))
@@ -328,7 +361,7 @@ fn lags(own: &[Iterated], links: &Links, values: [&[f64]; 5]) -> bool {
     let ranges: Vec<_> = ranges.collect();
     ranges.iter().any(|(slot, _)| {
         let all = ranges.iter().filter(|(other, _)| other == slot).flat_map(|(_, range)| range.clone());
-        let same = |a: &[f64], b: &[f64]| all.clone().all(|k| a[k] == b[k]);
-        values.windows(2).any(|pair| same(pair[0], pair[1])) && !same(values[0], values[4])
+        let mut stays = values.windows(2).map(|pair| all.clone().all(|k| pair[0][k] == pair[1][k]));
+        stays.any(|stays| stays) && stays.any(|stays| !stays)
     })
 }

@@ -86,7 +86,7 @@ impl Loops {
             loops.loops.push(LoopValues::new(numbers, links, feed_through, [own, sources], cannot));
         }
         loops.find_whole(instances);
-        let fed = loops.loops.iter().filter(|own| !own.is_whole());
+        let fed = loops.loops.iter().filter(|own| own.why_whole().is_none());
         let parts: Vec<usize> = fed.flat_map(LoopValues::parts).collect();
         loops.members.extend(parts);
         loops.members.sort_unstable();
@@ -97,22 +97,29 @@ impl Loops {
         Ok(loops)
     }
 
-    /// A loop goes in whole steps, too, where one that does shares an FMU with it: each makes one kind of step.
+    /// Loops that share an FMU, or feed one another, make one kind of step: by quarters where all can and one of them is worth it.
     fn find_whole(&mut self, instances: &[Instance]) {
-        loop {
-            let whole = self.loops.iter().filter(|own| own.is_whole());
-            let stepped: Vec<usize> = whole.flat_map(|own| own.members().iter().copied()).collect();
-            let mut changed = false;
-            for own in self.loops.iter_mut().filter(|own| !own.is_whole()) {
-                let shared = own.parts().find(|slot| stepped.contains(slot));
-                if let Some(slot) = shared {
-                    let name = instances[slot].name();
-                    own.make_whole(format!("as `{name}`, which feeds it, makes whole steps"));
-                    changed = true;
+        let count = self.loops.len();
+        let shares =
+            |a: &LoopValues, b: &LoopValues| a.parts().any(|slot| b.parts().any(|other| other == slot));
+        let pairs = (0..count).flat_map(|a| (0..count).map(move |b| [a, b]));
+        let shared: Vec<[usize; 2]> =
+            pairs.filter(|[a, b]| a != b && shares(&self.loops[*a], &self.loops[*b])).collect();
+        let group = components(count, &shared);
+        for number in 0..count {
+            let beside = (0..count).filter(|other| group[*other] == group[number]);
+            let beside: Vec<&LoopValues> = beside.map(|other| &self.loops[other]).collect();
+            let whole = beside.iter().find_map(|own| Some((own.members(), own.why_whole()?)));
+            let why = match whole {
+                Some((members, why)) => {
+                    let names: Vec<&str> = members.iter().map(|slot| instances[*slot].name()).collect();
+                    format!("as the loop of {} beside it does, {why}", names.join(", "))
                 }
-            }
-            if !changed {
-                return;
+                None if beside.iter().any(|own| own.integrates()) => continue,
+                None => "as outputs follow all its values at once".to_owned(),
+            };
+            if self.loops[number].why_whole().is_none() {
+                self.loops[number].make_whole(why);
             }
         }
     }
@@ -146,7 +153,7 @@ impl Loops {
 
     /// Keeps states and values at the start of the step; the first trial is made with the values of the start.
     pub fn begin(&mut self, links: &mut Links, instances: &mut [Instance]) -> Result {
-        self.loops.iter_mut().for_each(|own| own.begin(links));
+        self.loops.iter_mut().try_for_each(|own| own.begin(links, instances))?;
         self.members.iter().try_for_each(|slot| instances[*slot].save_state(self.state))
     }
 
@@ -169,25 +176,28 @@ impl Loops {
         links: &mut Links,
         subsystems: &mut Subsystems,
     ) -> Result<Option<String>> {
-        let mut repetitions = 0;
-        while repetitions < MOST {
+        let (mut repetitions, mut begun) = (0, false);
+        loop {
             if span.broken.load(Ordering::Relaxed) || self.stand(links, &subsystems.instances)? {
                 return Ok(None);
             }
-            if self.loops.iter().any(LoopValues::runs_away) {
-                break;
+            if !std::mem::replace(&mut begun, true) {
+                self.loops.iter_mut().for_each(LoopValues::begin_quarters);
             }
-            if self.loops.iter().any(LoopValues::lags) {
+            let by_quarters = self.loops.iter().any(LoopValues::goes_by_quarters);
+            let hopeless = repetitions == MOST || self.loops.iter().any(LoopValues::runs_away);
+            if by_quarters && (hopeless || self.loops.iter().any(LoopValues::lags)) {
                 self.loops.iter_mut().for_each(LoopValues::go_whole);
+                repetitions = 0;
+            } else if hopeless {
+                return Ok(Some(self.unsolved(repetitions, span, links, &subsystems.instances)));
             }
             repetitions += 1;
             self.repeat(order, span, links, subsystems)?;
         }
-        Ok(Some(self.unsolved(repetitions, span, links, &subsystems.instances)))
     }
 
-    /// One trial of the members from the start of the step, with the inputs that the guess makes. Loops that go by quarters come first: they feed others, but
-    /// are fed by none that makes whole steps.
+    /// One trial of the members from the start of the step, with the inputs that the guess makes.
     fn repeat(
         &mut self,
         order: &StepOrder,
@@ -204,7 +214,10 @@ impl Loops {
             let mut quarter = span.quarter(k);
             self.try_part(Part::Quarter(k), &by_quarters, order, &mut quarter, links, subsystems)?;
             if quarter.broken.load(Ordering::Relaxed) {
-                return self.refuse_quarters(&by_quarters, span, subsystems);
+                return match self.refuse_quarters(&by_quarters, span, subsystems) {
+                    true => self.repeat(order, span, links, subsystems),
+                    false => Ok(()),
+                };
             }
             if k < 3 {
                 for own in self.loops.iter_mut().filter(|own| own.goes_by_quarters()) {
@@ -218,16 +231,16 @@ impl Loops {
         self.try_part(Part::Whole, &whole, order, span, links, subsystems)
     }
 
-    /// A quarter was not made: where it was discarded, the step is tried whole; a failure ends it.
-    fn refuse_quarters(&mut self, by_quarters: &[usize], span: &Span, subsystems: &mut Subsystems) -> Result {
+    /// A quarter was not made: where it was discarded, the step is to be tried whole; a failure ends it.
+    fn refuse_quarters(&mut self, by_quarters: &[usize], span: &Span, subsystems: &mut Subsystems) -> bool {
         let failed = |slot: &usize| matches!(subsystems.schedules[*slot].trial.as_deref(), Some(Err(_)));
         if by_quarters.iter().any(failed) {
             span.broken.store(true, Ordering::Relaxed);
-            return Ok(());
+            return false;
         }
         by_quarters.iter().for_each(|slot| subsystems.schedules[*slot].trial = None);
         self.loops.iter_mut().for_each(LoopValues::go_whole);
-        Ok(())
+        true
     }
 
     /// A part of the trial, of those members that make it so, level by level.
@@ -243,6 +256,11 @@ impl Loops {
         let quarters = part != Part::Whole;
         let mut own = self.loops.iter().filter(|own| own.goes_by_quarters() == quarters);
         own.try_for_each(|own| own.set(part, links, &mut subsystems.instances))?;
+        if let Part::Quarter(k) = part {
+            let mut lines =
+                links.numbers.iter().filter(|l| l.follows_line() && members.contains(&l.slots()[1]));
+            lines.try_for_each(|link| link.pass_on_quarter(k, &mut subsystems.instances))?;
+        }
         for level in 0..order.levels_before_loops() {
             span.level = level as u32;
             order.pass_on(level, |slot| members.contains(&slot), links, &mut subsystems.instances)?;

@@ -16,7 +16,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::Result;
 use terraglue_host::{Instance, Progress, Workers};
-use terraglue_subsystem::{Motion, Response, Step};
+use terraglue_scenario::ModuleKind;
+use terraglue_subsystem::{Motion, Response, Step, Values};
 
 /// Steps from one that is watched to the next.
 const SAMPLED: u64 = 64;
@@ -85,7 +86,14 @@ impl Uncoupled {
 
     /// Forgets the trials of a step that glue did not converge in.
     pub fn discard(&self, links: &mut Links, subsystems: &mut Subsystems) -> Result {
-        self.loops.discard(links, &mut subsystems.instances)
+        let Subsystems { instances, schedules, .. } = subsystems;
+        for (instance, turn) in instances.iter_mut().zip(schedules).filter(|(_, t)| t.step_multiple > 1) {
+            // an FMU goes back before it is set: the end of its long step may not be reached by the shorter step
+            if !turn.glued && ModuleKind::is_fmu(instance.module()) {
+                instance.set(&[], Values::F64(&[]))?;
+            }
+        }
+        self.loops.discard(links, instances)
     }
 
     /// Trials of those that take outputs of others at the end of the step, level by level.

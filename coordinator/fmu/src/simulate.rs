@@ -128,8 +128,8 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         inputs.set(&mut instance, t).map_err(at)?;
         instance.clocks_mut().forget_ticks();
         let events;
-        let made = halving(&mut instance, &inputs, &mut before, (t, end, step), &mut tables.intermediate);
-        (ended, events) = made.map_err(|e| at(inputs.way_out(e, end)))?;
+        let step = halving(&mut instance, &inputs, &mut before, (t, end), &mut tables.intermediate);
+        (ended, events) = step.map_err(|e| at(inputs.way_out(e, end)))?;
         let now = ended.unwrap_or(end);
         row(&marked(values.at(&instance, now).map_err(|e| named(e, now))?, events))
     });
@@ -234,25 +234,23 @@ impl Before {
     }
 }
 
-/// A step to `end`, of a nominal length, in halves where the FMU discards it and can go back. Answers when the FMU asked for the end, and how
-/// many events there were.
+/// A step, in halves where the FMU discards it and can go back. Answers when the FMU asked for the end, and how many
+/// events there were.
 fn halving(
     instance: &mut FmuInstance,
     inputs: &Inputs,
     before: &mut Before,
-    (start, end, step): (f64, f64, f64),
+    (start, end): (f64, f64),
     between: &mut Option<Line>,
 ) -> Result<(Option<f64>, u32)> {
     let variable_step = instance.description().capabilities.variable_step;
-    // times are rounded: the length is the nominal one, and no longer than to the end, as in scenarios
-    let (mut t, mut h, mut halvings, mut events) = (start, step.min(end - start), 0, 0);
-    let splinter = 1e-9 * (end - start);
-    while end - t > splinter {
-        let to = if end - t - h <= splinter { end } else { t + h };
+    let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
+    while end - t > 1e-9 * (end - start) {
         if before.saves {
             before.save(instance)?;
         }
-        inputs.begin_part(instance, (t, to), t == start && halvings == 0)?;
+        let part = (t, if h >= end - t { end } else { t + h });
+        inputs.begin_part(instance, part, t == start && halvings == 0)?;
         let made = instance.do_step(Advance { t, h: h.min(end - t), for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
             for row in instance.take_intermediate() {
@@ -267,7 +265,7 @@ fn halving(
             Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
             Ok(done) => {
                 events += done.events;
-                t = to;
+                t = if h >= end - t { end } else { t + h };
             }
             Err(Error::Discard { .. }) if before.saves && variable_step && halvings < 10 => {
                 instance.restore(&before.state)?;

@@ -431,6 +431,7 @@ fn member(instance: &Instance) -> Member {
 fn schedules(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<StepSchedule> {
     let glued = |slot| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
     let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| StepSchedule {
+        is_fmu: terraglue_scenario::ModuleKind::is_fmu(instance.module()),
         level: 0,
         step_multiple: spec.step_multiple.max(1),
         glued: glued(slot),

@@ -18,6 +18,13 @@ pub(super) struct Span {
 }
 
 impl Span {
+    /// The step with the length that leads to its end, where it is the last one to there.
+    fn on_grid(&self) -> Step<'static> {
+        let left = self.end - self.step.t;
+        let h = if (left - self.step.h).abs() <= 1e-9 * self.step_s { left } else { self.step.h };
+        Step { h, ..self.step }
+    }
+
     /// One of four parts of it, from 0 on.
     pub fn quarter(&self, k: u32) -> Self {
         let Self { step, end, nominal, step_s, level, .. } = *self;
@@ -33,6 +40,8 @@ pub(super) struct StepSchedule {
     pub step_multiple: u32,
     /// Place in the order of the steps: those of a higher level take outputs of lower ones at the end of the step.
     pub level: u32,
+    /// Whether its steps end at the very times of the grid, of which their lengths are differences: FMUs may compare the times.
+    pub is_fmu: bool,
     /// Whether it is glued: it makes none by itself.
     pub glued: bool,
     /// Whether it makes no step now, as controllers do before the start.
@@ -68,6 +77,10 @@ impl StepSchedule {
         let step = match (self.glued, self.step_multiple) {
             (true, _) => return None,
             _ if self.holds => return None,
+            (false, 1) if self.is_fmu => {
+                long = span.on_grid();
+                &long
+            }
             (false, 1) => &span.step,
             (false, _) => {
                 long = self.long_step(span)?;

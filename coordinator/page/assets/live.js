@@ -103,6 +103,8 @@ function start() {
   run.on("staged", () => {
     const { camera, ground, layers } = layout(run);
     if (wish.get("camera") ?? camera) stage.view.camera.text = wish.get("camera") ?? camera;
+    // of a ground that is known only later, too
+    stage.colour = ground;
     if (ground) stage.view.colour(ground);
     if (layers) stage.view.menus.show(layers);
     if (wish.has("t")) timeline.restore(Number(wish.get("t")));

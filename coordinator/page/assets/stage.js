@@ -73,8 +73,7 @@ export class Stage {
     const of = typeof header.header === "string" ? JSON.parse(header.header) : header;
     this.lattice = Object.fromEntries(Object.entries(of).map(([key, value]) => [key, Number(value)]));
     this.view.setGround(this.lattice);
-    this.view.colour("sinkage");
-    this.beginView();
+    this.view.colour(this.colour ?? "sinkage");
   }
 
   takePoses({ transforms }) {
@@ -90,11 +89,10 @@ export class Stage {
     this.beginView();
   }
 
-  // The view begins once shapes, poses and the lattice of a ground are known, whichever come first: a run that stands still sends none of them again.
+  // The view begins once both shapes and poses are known, whichever come first: a run that stands still sends neither again.
   beginView() {
     const { poses, entities } = this.view;
-    const groundless = this.run.link.byTopic.has("/ground/tiles") && !this.lattice;
-    if (!this.first || groundless || !poses.size || !entities.size) return;
+    if (!this.first || !poses.size || !entities.size) return;
     this.first = false;
     this.view.body ??= poses.keys().next().value;
     this.view.fit();

@@ -31,6 +31,9 @@ int fmi2FreeFMUstate(Fmu *u, void **s) { free(*s); *s = 0; return 0; }
 int fmi2DoStep(Fmu *u, double t, double h, int p) { double *r = u->r; int *i = u->i, *b = u->b; %(step)s return 0; }
 """
 
+# the step of a mass of 1 kg, exact under a force that is held: r is force, place and speed
+MOTION = "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];"
+
 
 def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags="", depends=None, instead=()):
     """The FMU `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions

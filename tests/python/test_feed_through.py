@@ -5,11 +5,10 @@ import json
 import zipfile
 
 import pytest
-from cfmu import build, build_3
+from cfmu import MOTION, build, build_3
 from conftest import terraglue
 
 MASS = [("f", "input", -10.0, ""), ("x", "output", 0.1, ""), ("v", "output", 0.0, ""), ("a", "output", -10.0, "")]
-MOTION = "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];"
 SPRING = [("x", "input", 0.1, ""), ("f", "output", -10.0, "")]
 GAIN = [("u", "input", 0.0, ""), ("y", "output", 0.0, "")]
 EXCHANGES = ["", 'order = "jacobi"', 'extrapolate = "linear"', 'order = "jacobi"\nextrapolate = "linear"', 'order = "iterate"']

@@ -6,7 +6,7 @@ import math
 import zipfile
 
 import pytest
-from cfmu import build, build_3
+from cfmu import MOTION, build, build_3
 from conftest import terraglue
 
 # a mass of 1 kg on a spring of 100 N/m, 100 mm off
@@ -18,7 +18,7 @@ SPRING = [("x", "input", 0.1, ""), ("f", "output", -10.0, "")]
 def parts(tmp_path_factory):
     folder = tmp_path_factory.mktemp("parts")
     # exact under a constant force
-    build(folder, "mass", MASS, "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(folder, "mass", MASS, MOTION, depends="")
     build(folder, "spring", SPRING, "r[1] = -100.0 * r[0];", depends="1")
     return folder
 
@@ -146,7 +146,7 @@ def test_workers_solve_a_loop_with_the_same_bits(parts, tmp_path):
 
 def test_stiff_loops_stay_bounded(tmp_path):
     # 2 pi / 628 = 10 ms is the period of the spring; steps are ten times as long
-    build(tmp_path, "mass", MASS, "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(tmp_path, "mass", MASS, MOTION, depends="")
     build(tmp_path, "spring", [("x", "input", 0.1, ""), ("f", "output", -4e4, "")], "r[1] = -4e5 * r[0];", depends="1")
     for order in ("iterate", "iterate-ends"):
         rows = sprung(tmp_path, tmp_path, 0.1, f'order = "{order}"', f'order = "{order}"')
@@ -157,9 +157,8 @@ def test_stiff_loops_stay_bounded(tmp_path):
 def test_a_loop_whose_fmu_makes_no_half_steps_exchanges_values_at_the_ends(parts, tmp_path, how):
     # with a solver step of 10 ms nothing moves until that is over
     own = "if (h < 0.0099) { r[3] += h; if (r[3] < 0.0099) return 0; h = r[3]; r[3] = 0; } "
-    step = "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];"
     reals = MASS + [("rest", "local", 0.0, "")]
-    build(tmp_path, "mass", reals, (own if how == "own_solver_step" else "") + step, depends="", variable_step=how != "one_length")
+    build(tmp_path, "mass", reals, (own if how == "own_solver_step" else "") + MOTION, depends="", variable_step=how != "one_length")
     (tmp_path / "spring.fmu").write_bytes((parts / "spring.fmu").read_bytes())
     energies, error = iterated(tmp_path, tmp_path, 0.01)
     notes = json.loads((tmp_path / "out/exchange.json").read_text())
@@ -312,7 +311,6 @@ def test_steps_of_a_minute(tmp_path):
 
 
 def test_an_array_of_one_element_and_a_scalar_fit(tmp_path):
-    from cfmu import build_3
 
     build(tmp_path, "ramp", RAMP, "r[0] = t + h;", depends="")
     build_3(tmp_path, "one", [("u", "input", "0.0", [1]), ("y", "output", "", [1])], "v[2][0] = v[1][0];")
@@ -421,7 +419,7 @@ def test_a_loop_that_is_driven_from_outside_is_of_fourth_order(parts, tmp_path, 
     build(tmp_path, "source", [("y", "output", 0.0, "")], "r[0] = 100.0 * sin(3.0 * (t + h));", depends="")
     build(tmp_path, "spring", [("x", "input", 0.0, ""), ("p", "input", 0.0, ""), ("f", "output", 0.0, "")], "r[2] = r[1] - 100.0 * r[0];", depends="1 2")
     build(tmp_path, "mass", [("f", "input", 0.0, ""), ("x", "output", 0.0, ""), ("v", "output", 0.0, "")],
-          "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+          MOTION, depends="")
     exact = 100 / (100 - 9) * (math.sin(3 * 2.0) - 0.3 * math.sin(10 * 2.0))
     errors = []
     for h in (0.04, 0.02, 0.01):
@@ -468,7 +466,7 @@ def test_the_unit_of_a_loop_does_not_matter(tmp_path, order):
 
 
 def test_what_discards_a_quarter_of_a_step_is_stepped_whole(parts, tmp_path):
-    build(tmp_path, "mass", MASS, "if (h < 0.009) return 2; r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(tmp_path, "mass", MASS, "if (h < 0.009) return 2; " + MOTION, depends="")
     (tmp_path / "spring.fmu").write_bytes((parts / "spring.fmu").read_bytes())
     ends = iterated(tmp_path, tmp_path, 0.01, "iterate-ends")
     energies, error = iterated(tmp_path, tmp_path, 0.01)
@@ -523,7 +521,7 @@ def driven(folder, source, h, link="", more=""):
     """Place after 2 s of a mass on a spring that a source pushes; `source` is the step of the source."""
     build(folder, "source", [("y", "output", 0.0, ""), ("rest", "local", 0.0, "")], source, depends="")
     build(folder, "driven", DRIVEN, "r[2] = r[1] - 100.0 * r[0];", depends="1 2")
-    build(folder, "free", [("f", "input", 0.0, ""), ("x", "output", 0.0, ""), ("v", "output", 0.0, "")], "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(folder, "free", [("f", "input", 0.0, ""), ("x", "output", 0.0, ""), ("v", "output", 0.0, "")], MOTION, depends="")
     text = f"[time]\nstep_s = {h}\nduration_s = 2.0\n" + "".join(f'[{n}]\nfmu = "{n}.fmu"\n' for n in ("source", "driven", "free"))
     text += f'[[connect]]\nfrom = "free.x"\nto = "driven.x"\n{ITERATE}[[connect]]\nfrom = "driven.f"\nto = "free.f"\n{ITERATE}'
     text += f'[[connect]]\nfrom = "source.y"\nto = "driven.p"\n{link}{more}'
@@ -544,7 +542,7 @@ def test_a_loop_at_rest_that_feeds_another_keeps_its_time(tmp_path):
     more = '[filter]\nfmu = "filter.fmu"\n[constant]\nfmu = "constant.fmu"\n'
     more += f'[[connect]]\nfrom = "constant.y"\nto = "filter.u"\n{ITERATE}'
     build(tmp_path, "driven", DRIVEN[:2] + [("f", "output", 1.0, "")], "r[2] = r[1] - 100.0 * r[0];", depends="1 2")
-    build(tmp_path, "free", [("f", "input", 1.0, ""), ("x", "output", 0.0, ""), ("v", "output", 0.0, "")], "r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="")
+    build(tmp_path, "free", [("f", "input", 1.0, ""), ("x", "output", 0.0, ""), ("v", "output", 0.0, "")], MOTION, depends="")
     text = "[time]\nstep_s = 0.02\nduration_s = 2.0\n" + "".join(f'[{n}]\nfmu = "{n}.fmu"\n' for n in ("driven", "free")) + more
     text += f'[[connect]]\nfrom = "free.x"\nto = "driven.x"\n{ITERATE}[[connect]]\nfrom = "driven.f"\nto = "free.f"\n{ITERATE}[[connect]]\nfrom = "filter.z"\nto = "driven.p"\n'
     assert ended(tmp_path, text, "filter.clock") == pytest.approx(2.0, abs=1e-9)
@@ -571,7 +569,7 @@ def test_a_loop_may_go_back_to_before_its_fmus_are_initialised(tmp_path):
     # the place is set when the FMU leaves its initialisation: a state from before does not have it
     mass = [("f", "input", -10.0, ""), ("x", "output", 0.1, ""), ("v", "output", 0.0, ""), ("on", "local", 0.0, "")]
     leave = "int fmi2ExitInitializationMode(Fmu *u) { u->r[1] = 0.1; u->r[3] = 1.0; return 0; }"
-    build(tmp_path, "mass", mass, "if (r[3] < 0.5) return 3; r[1] += h * r[2] + 0.5 * h * h * r[0]; r[2] += h * r[0];", depends="", more=leave, instead=("fmi2ExitInitializationMode",))
+    build(tmp_path, "mass", mass, "if (r[3] < 0.5) return 3; " + MOTION, depends="", more=leave, instead=("fmi2ExitInitializationMode",))
     build(tmp_path, "spring", SPRING, "r[1] = -100.0 * r[0];", depends="1")
     for order in ("iterate", "iterate-ends"):
         rows = sprung(tmp_path, tmp_path, 0.01, f'order = "{order}"', f'order = "{order}"')

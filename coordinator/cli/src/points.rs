@@ -5,51 +5,47 @@
 
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{PackedElementField, PointCloud};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prost::Message;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use terraglue_diagnostics::{Error, Result};
-use terraglue_recording::{PoseSeries, RECORDING, Recording};
+use terraglue_diagnostics::Result;
+use terraglue_recording::{PoseSeries, RECORDING, Recording, STREAM, at};
 use terraglue_scenario::InputError;
 
 /// Unit of places in the file, m.
 const SCALE: f64 = 1e-4;
-/// Key of the metadata of a channel that carries a stream.
-const STREAM: &str = "stream";
 /// Schema of the streams that are written.
 const CLOUD: &str = "foxglove.PointCloud";
 
 /// Refuses a name that ends in neither `.las` nor `.laz`.
 pub fn check(path: &Path) -> Result<()> {
-    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match ending.as_deref() {
-        Some("las" | "laz") => Ok(()),
-        _ => {
-            let message = format!("--points {}: points are written as .las or .laz", path.display());
-            Err(InputError::plain(message, Some("e.g. --points scan.laz".into())).into())
-        }
+    if ends_in(path, "las") || ends_in(path, "laz") {
+        return Ok(());
     }
+    let message = format!("--points {}: points are written as .las or .laz", path.display());
+    Err(InputError::plain(message, Some("e.g. --points scan.laz".into())).into())
 }
 
 /// Writes the points of the recording in a folder; the answer is how many.
 ///
 /// # Errors
-/// [`Error::Input`]: the recording has no points, or another name. [`Error::File`]: the recording cannot be read, or the file not written.
+/// The recording has no points, or cannot be read; the file has another ending, or cannot be written.
 pub fn write(folder: &Path, path: &Path) -> Result<u64> {
     check(path)?;
     let poses = Recording::open(folder)?.poses;
     let recording = folder.join(RECORDING);
     let bytes = terraglue_subsystem::files::read(&recording).map_err(at(&recording))?;
-    let names = streams(&bytes);
-    if names.is_empty() {
+    let clouds = clouds(&bytes);
+    if clouds.is_empty() {
         let message = format!("--points {}: {} has no points", path.display(), recording.display());
         let help =
             format!("points come from streams of {CLOUD}, which `terraglue modules laser-scanner` offers");
         return Err(InputError::plain(message, Some(help)).into());
     }
     // under another name until it is complete
-    let part = path.with_extension(if is_compressed(path) { "part.laz" } else { "part.las" });
-    let written = write_all(&bytes, &names, &poses, &part);
+    let part = path.with_extension(if ends_in(path, "laz") { "part.laz" } else { "part.las" });
+    let written = write_all(&clouds, &poses, &part);
     match written {
         Ok(count) => std::fs::rename(&part, path).map_err(at(path)).map(|()| count),
         Err(why) => {
@@ -59,39 +55,26 @@ pub fn write(folder: &Path, path: &Path) -> Result<u64> {
     }
 }
 
-fn at(path: &Path) -> impl FnOnce(std::io::Error) -> Error {
-    let path = path.display().to_string();
-    move |source| Error::File { path, source }
-}
-
-fn is_compressed(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("laz"))
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 /// Messages of streams of points, with their names; what is damaged ends them.
-fn clouds(bytes: &[u8]) -> impl Iterator<Item = (String, Vec<u8>)> {
+fn clouds(bytes: &[u8]) -> Vec<(String, PointCloud)> {
     let options = mcap::read::Options::IgnoreEndMagic.into();
     let messages = mcap::MessageStream::new_with_options(bytes, options).into_iter().flatten();
-    messages.map_while(|message| message.ok()).filter_map(|message| {
+    let messages = messages.map_while(|message| message.ok()).filter_map(|message| {
         let own = message.channel.schema.as_ref().is_some_and(|s| s.name == CLOUD);
         let name = message.channel.metadata.get(STREAM).filter(|_| own)?;
-        Some((name.clone(), message.data.into_owned()))
-    })
+        Some((name.clone(), PointCloud::decode(&message.data[..]).ok()?))
+    });
+    messages.collect()
 }
 
-/// Names of the streams with points, sorted.
-fn streams(bytes: &[u8]) -> Vec<String> {
-    let mut names: Vec<String> = clouds(bytes).map(|(name, _)| name).collect();
-    names.sort();
-    names.dedup();
-    names
-}
-
-type Poses = std::collections::BTreeMap<String, PoseSeries>;
+type Poses = BTreeMap<String, PoseSeries>;
 
 fn write_all(
-    bytes: &[u8],
-    names: &[String],
+    clouds: &[(String, PointCloud)],
     poses: &Poses,
     path: &Path,
 ) -> std::result::Result<u64, las::Error> {
@@ -103,11 +86,11 @@ fn write_all(
     // the same run gives the same bytes on any day
     builder.date = None;
     let mut writer = las::Writer::from_path(path, builder.into_header()?)?;
+    let names: BTreeSet<&String> = clouds.iter().map(|(name, _)| name).collect();
     let mut count = 0;
-    for (name, data) in clouds(bytes) {
-        let Ok(cloud) = PointCloud::decode(&data[..]) else { continue };
-        let source = names.iter().position(|n| *n == name).unwrap_or(0) + 1;
-        for point in points(&cloud, poses) {
+    for (name, cloud) in clouds {
+        let source = names.iter().take_while(|other| **other <= name).count();
+        for point in points(cloud, poses) {
             writer.write_point(las::Point { point_source_id: source as u16, ..point })?;
             count += 1;
         }
@@ -131,11 +114,10 @@ fn points<'a>(cloud: &'a PointCloud, poses: &'a Poses) -> impl Iterator<Item = l
     let [x, y, z, time, intensity, ring] = ["x", "y", "z", "time", "intensity", "ring"].map(field);
     let stride = (cloud.point_stride as usize).max(1);
     cloud.data.chunks_exact(stride).filter(move |_| known).filter_map(move |data| {
-        let own = Vector3::new(number(x?, data)?, number(y?, data)?, number(z?, data)?);
+        let own = Point3::new(number(x?, data)?, number(y?, data)?, number(z?, data)?);
         let t = end + time.and_then(|f| number(f, data)).unwrap_or(0.0);
         let world_from_body = series.map_or(Isometry3::identity(), |s| pose_at(s, t));
-        let place = (world_from_body * body_from_cloud).transform_vector(&own)
-            + (world_from_body * body_from_cloud).translation.vector;
+        let place = world_from_body * body_from_cloud * own;
         let bright = intensity.and_then(|f| number(f, data)).unwrap_or(0.0);
         place.iter().all(|x| x.is_finite()).then(|| las::Point {
             x: place.x,

@@ -94,4 +94,5 @@ pub use summary::{
 pub use summary_observer::SummaryObserver;
 pub use table::Table;
 pub use tap::{Tap, TopicInfo};
+pub use topics::STREAM;
 pub use trace::Trace;

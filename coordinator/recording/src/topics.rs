@@ -15,7 +15,7 @@ pub(crate) const COLUMNS: &str = "columns";
 pub(crate) const SUBSYSTEM: &str = "subsystem";
 
 /// Key of a channel's metadata: the full name of a stream.
-pub(crate) const STREAM: &str = "stream";
+pub const STREAM: &str = "stream";
 
 /// A topic with the type of its messages.
 pub(crate) struct Topic {

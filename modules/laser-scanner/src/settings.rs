@@ -23,14 +23,19 @@ const MOST_RAYS: usize = 1_000_000;
 /// Name of the pattern whose beams are given in the scenario.
 const TABLE: &str = "table";
 
+/// A number that is not negative.
+fn part(name: &str, unit: &str, default: f64, help: &str) -> Parameter {
+    Parameter::number(name, unit, default, help).within(0.0, f64::INFINITY)
+}
+
+/// A share.
+fn share(name: &str, default: f64, help: &str) -> Parameter {
+    Parameter::number(name, "", default, help).within(0.0, 1.0)
+}
+
 /// Name, kind and parameters.
 pub fn schema() -> Schema {
     let [mount, offset] = Mount::parameters();
-    let part = |name: &str, unit: &str, default: f64, help: &str| {
-        Parameter::number(name, unit, default, help).within(0.0, f64::INFINITY)
-    };
-    let share =
-        |name: &str, default: f64, help: &str| Parameter::number(name, "", default, help).within(0.0, 1.0);
     let [line, vlp, os1] = Pattern::NAMES;
     let pattern = Parameter::of(
         "pattern",
@@ -76,9 +81,6 @@ pub fn schema() -> Schema {
 /// Parameters of the extent of a beam and of its returns.
 fn of_beam() -> Vec<Parameter> {
     let [strongest, first, last] = Returns::NAMES;
-    let part = |name: &str, unit: &str, default: f64, help: &str| {
-        Parameter::number(name, unit, default, help).within(0.0, f64::INFINITY)
-    };
     vec![
         part(
             "divergence_rad",
@@ -93,8 +95,7 @@ fn of_beam() -> Vec<Parameter> {
             0.6,
             "Surfaces that are nearer to each other along a beam come back as one point",
         ),
-        Parameter::number("threshold", "", 0.0, "Least share of the light that must come back for a point")
-            .within(0.0, 1.0),
+        share("threshold", 0.0, "Least share of the light that must come back for a point"),
         Parameter::of(
             "returns",
             ParameterType::Text,

@@ -19,7 +19,6 @@ use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_scenario::ModuleKind;
 use terraglue_subsystem::{Capabilities, Motion, Response, ValueType};
 
 /// Most repetitions of a step.
@@ -124,7 +123,7 @@ impl Loops {
         }
     }
 
-    /// Finds those that repeat the step, and those that follow: an FMU that a loop reaches is part of it if it acts on the loop.
+    /// Finds those that repeat the step: an FMU that a loop reaches is part of it if it acts on the loop.
     fn find_members(&mut self, links: &Links, edges: &[[usize; 2]], count: usize) {
         let iterated: Vec<[usize; 2]> =
             links.numbers.iter().filter(|link| link.is_iterated()).map(Link::slots).collect();
@@ -132,7 +131,7 @@ impl Loops {
         let behind = reached(count, edges, iterated.iter().map(|[_, to]| *to));
         let before = reached(count, &backwards, iterated.iter().map(|[from, _]| *from));
         let repeats = |slot: &usize| before[*slot] || iterated.iter().any(|[_, to]| to == slot);
-        (self.members, self.followers) = (0..count).filter(|slot| behind[*slot]).partition(repeats);
+        self.members = (0..count).filter(|slot| behind[*slot] && repeats(slot)).collect();
     }
 
     /// Those that are stepped when the loops are solved.
@@ -324,7 +323,7 @@ fn makes_no_quarters(instance: &Instance, schedule: &StepSchedule) -> Option<Str
 fn cannot_repeat(instance: &Instance, schedule: &StepSchedule) -> Option<&'static str> {
     let can = |what| instance.capabilities().has(what);
     match schedule {
-        _ if !ModuleKind::is_fmu(instance.module()) => Some("is no FMU"),
+        StepSchedule { is_fmu: false, .. } => Some("is no FMU"),
         StepSchedule { glued: true, .. } => Some("is glued"),
         StepSchedule { step_multiple: 2.., .. } => Some("makes steps of another length"),
         _ if !(can(Capabilities::RETRY) && can(Capabilities::STATE)) => Some("cannot save its state"),

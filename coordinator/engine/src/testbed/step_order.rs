@@ -10,7 +10,6 @@ use crate::graph::levels;
 use crate::signals::{ConnectedValue, Faults, FeedThroughs, Links, Place};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_scenario::ModuleKind;
 
 /// Connections that pass values within a step, by the level of the subsystem that they feed; level 0 has none.
 #[derive(Debug, Default)]
@@ -133,8 +132,8 @@ fn candidates(
     schedules: &[StepSchedule],
 ) -> Vec<ConnectedValue> {
     let orderly = |slot: usize| {
-        let StepSchedule { glued, step_multiple, .. } = schedules[slot];
-        ModuleKind::is_fmu(instances[slot].module()) && !glued && step_multiple == 1
+        let StepSchedule { is_fmu, glued, step_multiple, .. } = schedules[slot];
+        is_fmu && !glued && step_multiple == 1
     };
     let within = |[from, to]: [usize; 2]| from != to && orderly(from) && orderly(to);
     let numbers = links.numbers.iter().enumerate();

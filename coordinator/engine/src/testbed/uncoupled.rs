@@ -16,7 +16,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::Result;
 use terraglue_host::{Instance, Progress, Workers};
-use terraglue_scenario::ModuleKind;
 use terraglue_subsystem::{Motion, Response, Step, Values};
 
 /// Steps from one that is watched to the next.
@@ -87,11 +86,10 @@ impl Uncoupled {
     /// Forgets the trials of a step that glue did not converge in.
     pub fn discard(&self, links: &mut Links, subsystems: &mut Subsystems) -> Result {
         let Subsystems { instances, schedules, .. } = subsystems;
-        for (instance, turn) in instances.iter_mut().zip(schedules).filter(|(_, t)| t.step_multiple > 1) {
+        let long = |turn: &StepSchedule| turn.is_fmu && !turn.glued && turn.step_multiple > 1;
+        for (instance, _) in instances.iter_mut().zip(schedules).filter(|(_, turn)| long(turn)) {
             // an FMU goes back before it is set: the end of its long step may not be reached by the shorter step
-            if !turn.glued && ModuleKind::is_fmu(instance.module()) {
-                instance.set(&[], Values::F64(&[]))?;
-            }
+            instance.set(&[], Values::F64(&[]))?;
         }
         self.loops.discard(links, instances)
     }

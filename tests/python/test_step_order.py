@@ -311,7 +311,6 @@ def test_steps_of_a_minute(tmp_path):
 
 
 def test_an_array_of_one_element_and_a_scalar_fit(tmp_path):
-
     build(tmp_path, "ramp", RAMP, "r[0] = t + h;", depends="")
     build_3(tmp_path, "one", [("u", "input", "0.0", [1]), ("y", "output", "", [1])], "v[2][0] = v[1][0];")
     text = '[time]\nstep_s = 0.1\nduration_s = 0.5\n[ramp]\nfmu = "ramp.fmu"\n[one]\nfmu = "one.fmu"\n[last]\nfmu = "last.fmu"\n'

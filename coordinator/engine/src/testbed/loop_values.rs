@@ -189,9 +189,8 @@ impl LoopValues {
             first.clone_from(start);
             first.extend_from_slice(passed);
         }
-        (self.by_quarters, self.lags, self.off, self.stuck) = (false, false, f64::INFINITY, 0);
         self.scale.clear();
-        self.acceleration.begin();
+        self.restart(false);
         Ok(())
     }
 
@@ -208,7 +207,12 @@ impl LoopValues {
     pub fn go_whole(&mut self) {
         self.guess.truncate(self.start.len());
         self.scale.truncate(self.start.len());
-        (self.by_quarters, self.lags, self.off, self.stuck) = (false, false, f64::INFINITY, 0);
+        self.restart(false);
+    }
+
+    /// Trials from now on are of one kind, and those before are no guide to them.
+    fn restart(&mut self, by_quarters: bool) {
+        (self.by_quarters, self.lags, self.off, self.stuck) = (by_quarters, false, f64::INFINITY, 0);
         self.acceleration.begin();
     }
 
@@ -282,14 +286,12 @@ impl LoopValues {
         if !self.why_whole.is_empty() {
             return;
         }
-        self.by_quarters = true;
         self.guess.extend_from_within(..);
         let n = self.start.len();
         let middle = self.guess[n..].iter_mut();
         middle.zip(&self.start).for_each(|(middle, start)| *middle = 0.5 * (*middle + start));
         self.scale.extend_from_within(..);
-        (self.off, self.stuck) = (f64::INFINITY, 0);
-        self.acceleration.begin();
+        self.restart(true);
     }
 
     /// Whether the guess has left all that start and first trial were of.

@@ -10,9 +10,9 @@ pub fn write_all() -> Outcome {
     schema::write_files(false)?;
     header::run(false)?;
     architecture::run(false)?;
-    must(&mut validation(&["pictures"]))?;
-    must(&mut validation(&["faults"]))?;
-    must(&mut validation(&["validate", "--quick", "--write-docs"]))?;
+    must(&mut validation(&["pictures"])?)?;
+    must(&mut validation(&["faults"])?)?;
+    must(&mut validation(&["validate", "--quick", "--write-docs"])?)?;
     claims()
 }
 

@@ -54,8 +54,8 @@ pub fn freeze(arguments: &Arguments) -> Outcome {
 
 /// Bits of the quick figures, as the validators print them.
 fn figures() -> Outcome<Hashes> {
-    let output = validation(&["bits"]).stderr(Stdio::inherit()).output();
-    let output = output.map_err(|e| format!("cannot start cargo: {e}"))?;
+    let output = validation(&["bits"])?.stderr(Stdio::inherit()).output();
+    let output = output.map_err(|e| format!("cannot start the validation: {e}"))?;
     if !output.status.success() {
         return Err("the quick figures could not be measured".into());
     }

@@ -15,7 +15,7 @@ use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
 use xtask_start::Install;
-use xtask_start::process::{Outcome, cargo};
+use xtask_start::process::{Outcome, built, command};
 
 /// Developer commands.
 #[derive(Parser, Debug)]
@@ -94,16 +94,14 @@ fn main() -> ExitCode {
     }
 }
 
-/// The program that measures, in the root of the workspace; cargo brings it up to date first.
-fn validation(arguments: &[&str]) -> std::process::Command {
-    let mut command = cargo(&["run", "--package", "terraglue-validation", "--"]);
-    command.args(arguments);
-    command
+/// The program that measures, up to date, in the root of the workspace.
+fn validation(arguments: &[&str]) -> Outcome<std::process::Command> {
+    Ok(command(built("terraglue-validation")?, arguments))
 }
 
 /// Becomes the program that measures, in the folder of the caller, whose paths the arguments may hold.
 fn handed_on(name: &str, arguments: &[OsString]) -> Outcome {
-    let mut command = validation(&[name]);
+    let mut command = validation(&[name])?;
     let here = std::env::current_dir().map_err(|e| format!("current folder: {e}"))?;
-    Err(format!("cannot start cargo: {}", command.args(arguments).current_dir(here).exec()))
+    Err(format!("cannot start the validation: {}", command.args(arguments).current_dir(here).exec()))
 }

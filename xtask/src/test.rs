@@ -13,7 +13,7 @@ pub fn test() -> Outcome {
     let in_parallel = ["-n", "auto", "--maxprocesses", "4", "--dist", "loadfile", "--durations", "20"];
     let tests = [&["-m", "pytest", "-q", "tests/python"], &in_parallel[..]].concat();
     must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;
-    must(&mut validation(&["validate", "--quick", "--check-docs"]))
+    must(&mut validation(&["validate", "--quick", "--check-docs"])?)
 }
 
 /// The Python of `target/venv`, with what `tests/python/requirements.txt` asks for.

@@ -61,7 +61,7 @@ mod tests {
     fn the_page_follows_from_the_stored_figures() {
         let shown = read(&root().join(PAGE)).expect("the page");
         let made = replaced(shown.clone(), &blocks().expect("tables that read")).expect("its blocks");
-        assert_eq!(shown, made, "run `cargo run --package terraglue-validation -- page`");
+        assert_eq!(shown, made, "run `cargo run --bin terraglue-validation -- page`");
     }
 
     #[test]

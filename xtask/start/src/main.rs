@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand};
 use std::os::unix::process::CommandExt;
 use std::process::{Command, ExitCode};
 use xtask_start::Install;
+use xtask_start::process::built;
 
 /// Developer commands.
 #[derive(Parser, Debug)]
@@ -23,9 +24,10 @@ fn main() -> ExitCode {
         },
         false => {
             // in the folder of the caller, whose paths the arguments may hold
-            let mut other = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-            let error = other.args(["run", "--package", "xtask", "--"]).args(arguments).exec();
-            format!("cannot start cargo: {error}")
+            match built("xtask") {
+                Ok(xtask) => format!("cannot start xtask: {}", Command::new(xtask).args(arguments).exec()),
+                Err(message) => message,
+            }
         }
     };
     eprintln!("error: {message}");

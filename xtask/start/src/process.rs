@@ -34,6 +34,16 @@ pub fn cargo(arguments: &[&str]) -> Command {
     command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()), arguments)
 }
 
+/// A developer program of the workspace, up to date. It is built with the features that the whole workspace asks for, as `cargo build
+/// --workspace` and `cargo test --workspace` build it: alone it would compile its dependencies once more.
+///
+/// # Errors
+/// Cargo cannot be started, or the program does not compile.
+pub fn built(name: &str) -> Outcome<PathBuf> {
+    must(&mut cargo(&["build", "--workspace", "--bin", name]))?;
+    Ok(target().join("debug").join(name))
+}
+
 /// Prints a command that must succeed, and runs it.
 ///
 /// # Errors

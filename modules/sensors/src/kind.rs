@@ -12,6 +12,8 @@ pub(crate) const OUTPUT: u32 = 16;
 pub enum SensorKind {
     /// Specific force and angular rate of a body, in the axes of the sensor.
     Imu,
+    /// Roll and pitch of a body against gravity.
+    Inclinometer,
     /// Distance along its axis x to the first surface.
     RangeFinder,
     /// Coordinate of a joint.
@@ -24,8 +26,14 @@ pub enum SensorKind {
 
 impl SensorKind {
     /// All kinds.
-    pub const ALL: [Self; 5] =
-        [Self::Imu, Self::RangeFinder, Self::JointEncoder, Self::FootForce, Self::ContactSwitch];
+    pub const ALL: [Self; 6] = [
+        Self::Imu,
+        Self::Inclinometer,
+        Self::RangeFinder,
+        Self::JointEncoder,
+        Self::FootForce,
+        Self::ContactSwitch,
+    ];
 
     /// The kind of this name.
     pub fn named(name: &str) -> Option<Self> {
@@ -36,6 +44,7 @@ impl SensorKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Imu => "imu",
+            Self::Inclinometer => "inclinometer",
             Self::RangeFinder => "range-finder",
             Self::JointEncoder => "joint-encoder",
             Self::FootForce => "foot-force",
@@ -45,7 +54,7 @@ impl SensorKind {
 
     /// Whether it sits on a body and looks at the world.
     pub fn is_mounted(self) -> bool {
-        matches!(self, Self::Imu | Self::RangeFinder)
+        matches!(self, Self::Imu | Self::Inclinometer | Self::RangeFinder)
     }
 
     /// Names and units of its channels; those from the fourth on have errors of their own.
@@ -59,6 +68,7 @@ impl SensorKind {
                 ("rate_y", "rad/s"),
                 ("rate_z", "rad/s"),
             ],
+            Self::Inclinometer => &[("roll", "rad"), ("pitch", "rad")],
             Self::RangeFinder => &[("distance", "m")],
             Self::JointEncoder => &[("angle", "rad")],
             Self::FootForce => &[

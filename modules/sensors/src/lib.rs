@@ -1,4 +1,4 @@
-//! Sensors that every robot has: IMU, range finder, joint encoder, foot force, contact switch, with their errors.
+//! Sensors that every robot has: IMU, inclinometer, range finder, joint encoder, foot force, contact switch, with their errors.
 //!
 //! [`Sensor`] is the module. Sensors on a body ([`SensorKind::is_mounted`]) look at the committed world; the others take their
 //! measurand from connections.

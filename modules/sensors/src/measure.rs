@@ -53,6 +53,21 @@ pub(crate) fn imu(
     Ok(Truth { values: [x, y, z, p, q, r], switch: false })
 }
 
+/// Roll and pitch of the sensor: turned by pitch about its y and then by roll about its new x, a level sensor has these axes. Both follow
+/// from the direction of gravity, as an accelerometer at rest or a vertical gyroscope shows it; a turn about it does not matter.
+pub(crate) fn inclination(
+    mount: &mut Mount,
+    world: &dyn World,
+    time: f64,
+    gravity: [f64; 3],
+) -> Result<Truth> {
+    let [x, y, z] = mount.state(world, time)?.world_from_body.turned_back(gravity.map(|g| -g));
+    let mut values = [0.0; MOST];
+    values[0] = libm::atan2(y, z);
+    values[1] = libm::atan2(-x, libm::hypot(y, z));
+    Ok(Truth { values, switch: false })
+}
+
 /// Distance along x of the sensor; `range_m` where nothing is met. The body that it sits on is not met.
 pub(crate) fn range(mount: &mut Mount, world: &dyn World, time: f64, range_m: f64) -> Result<Truth> {
     let (body, pose) = (mount.find(world)?, mount.state(world, time)?.world_from_body);

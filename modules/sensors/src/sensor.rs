@@ -58,6 +58,9 @@ impl Module for Sensor {
 
     fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
         let settings = Settings::from_config(config)?;
+        if settings.kind == SensorKind::Inclinometer && host.gravity() == [0.0; 3] {
+            return Err(Error::Refused("an inclinometer shows nothing where there is no gravity".into()));
+        }
         let state = State {
             inputs: [0.0; MOST],
             next: 0,
@@ -119,10 +122,11 @@ impl Sensor {
         let Self { settings, state, gravity, .. } = self;
         let Settings { kind, mount, range_m, .. } = settings;
         let mount = mount.as_mut().ok_or(Error::Unsupported)?;
-        if *kind == SensorKind::RangeFinder {
-            return measure::range(mount, world, time, *range_m);
+        match kind {
+            SensorKind::RangeFinder => measure::range(mount, world, time, *range_m),
+            SensorKind::Inclinometer => measure::inclination(mount, world, time, *gravity),
+            _ => measure::imu(mount, world, time, *gravity, &mut state.before),
         }
-        measure::imu(mount, world, time, *gravity, &mut state.before)
     }
 }
 

@@ -49,8 +49,7 @@ pub fn schema() -> Schema {
             "Force from which on a contact switch closes; it opens at half of it",
         ),
     ];
-    let help =
-        "IMU, range finder, joint encoder, foot force or contact switch with noise, bias, rounding and delay";
+    let help = "IMU, inclinometer, range finder, joint encoder, foot force or contact switch with noise, bias, rounding and delay";
     Schema { name: "sensor".into(), kind: Kind::Sensor, help: help.into(), parameters }
 }
 

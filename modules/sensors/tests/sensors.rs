@@ -123,6 +123,27 @@ fn an_imu_feels_acceleration_less_gravity_in_its_own_axes() {
 }
 
 #[test]
+fn an_inclinometer_shows_how_its_mount_leans_and_not_where_it_looks() {
+    // the body turns about z; its mount leans by −0.4 rad about y, then by 0.3 rad about its new x
+    let ([sp, cp], [sr, cr]) = ([(-0.2_f64).sin(), 0.2_f64.cos()], [0.15_f64.sin(), 0.15_f64.cos()]);
+    let turn = format!("{}, {}, {}, {}", cp * cr, cp * sr, sp * cr, -sp * sr);
+    let text = format!(
+        r#"{{"kind": "inclinometer", "mount": "robot.body", "mount_offset": [0, 0, 0, {turn}], "rate_hz": 0}}"#
+    );
+    let mut leaning = sensor(&text);
+    fly(leaning.as_mut(), 0);
+    for k in 0..2000 {
+        fly_step(leaning.as_mut(), k);
+        let [roll, pitch] = ["roll", "pitch"].map(|name| get(leaning.as_ref(), name));
+        assert!((roll - 0.3).abs() < 1e-12 && (pitch + 0.4).abs() < 1e-12, "{roll} {pitch}");
+    }
+    let config = Config::parse(&text).unwrap().with_defaults(&Sensor::schema());
+    let weightless = Standalone { gravity: [0.0; 3], ..Standalone::default() };
+    let why = Sensor::instantiate(&config, Arc::new(weightless)).err().unwrap().to_string();
+    assert!(why.contains("no gravity"), "{why}");
+}
+
+#[test]
 fn a_range_finder_that_meets_nothing_has_no_errors_and_none_leads_out_of_its_range() {
     // along x of the body, where nothing is, and down
     let down = std::f64::consts::FRAC_1_SQRT_2;

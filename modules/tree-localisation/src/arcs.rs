@@ -41,7 +41,7 @@ pub(crate) fn arcs(rings: &Rings, turn: u32) -> Vec<Arc> {
     for (number, ring) in (0..).zip(&rings.rings) {
         let returns = from_a_break(&ring.returns, rings.step);
         for piece in Pieces::of(&returns, rings.step) {
-            if let Some(arc) = piece.arc(rings.step, ring.slope) {
+            if let Some(arc) = piece.arc(rings.step) {
                 found.push(Arc { ring: number, turn, ..arc });
             }
         }
@@ -113,7 +113,7 @@ impl<'a> Iterator for Pieces<'a> {
 
 impl Piece<'_> {
     /// The circle; its middle is as high as the beam.
-    fn arc(&self, step: f64, slope: f64) -> Option<Arc> {
+    fn arc(&self, step: f64) -> Option<Arc> {
         let (first, last) = (self.returns.first()?, self.returns.last()?);
         let n = self.returns.len() as f64;
         let span = last.azimuth - first.azimuth + step;
@@ -128,6 +128,7 @@ impl Piece<'_> {
             return None;
         }
         let width = step * mean;
+        let slope = self.returns.iter().map(|r| r.rise).sum::<f64>() / (mean * n);
         let centre = [distance * libm::cos(azimuth), distance * libm::sin(azimuth), slope * distance];
         // each edge lies anywhere within a step; the two errors shift the middle and change the width
         let across = if self.is_whole { width / 24.0_f64.sqrt() } else { width + 0.5 * radius };

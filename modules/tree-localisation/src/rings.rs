@@ -14,6 +14,13 @@ pub(crate) struct Return {
     pub rise: f64,
 }
 
+impl Return {
+    /// Azimuth, by whole turns ahead, and slope.
+    fn ahead(&self, turns: f64) -> (f64, f64) {
+        (self.azimuth + turns, self.rise / self.distance)
+    }
+}
+
 /// Points of a turn, beam by beam in the order of their azimuths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rings {
@@ -25,8 +32,6 @@ pub struct Rings {
 /// The returns of a beam.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Ring {
-    /// Rise for each metre of horizontal distance.
-    pub slope: f64,
     pub returns: Vec<Return>,
 }
 
@@ -47,7 +52,7 @@ impl Rings {
         let known = !points.is_empty() && points.iter().all(|p| p.ring != NO_RING);
         let numbers = if known { points.iter().map(|p| p.ring).collect() } else { by_elevation(&returns)? };
         let count = numbers.iter().max().map_or(0, |n| usize::from(*n) + 1);
-        let mut rings: Vec<Ring> = (0..count).map(|_| Ring { slope: 0.0, returns: Vec::new() }).collect();
+        let mut rings: Vec<Ring> = (0..count).map(|_| Ring { returns: Vec::new() }).collect();
         for (number, r) in numbers.iter().zip(returns) {
             if r.distance > 1e-6 {
                 rings[usize::from(*number)].returns.push(r);
@@ -56,8 +61,6 @@ impl Rings {
         rings.retain(|ring| ring.returns.len() > 1);
         for ring in &mut rings {
             ring.returns.sort_unstable_by(|a, b| a.azimuth.total_cmp(&b.azimuth));
-            let middle = ring.returns[ring.returns.len() / 2];
-            ring.slope = middle.rise / middle.distance;
         }
         let step = step(&rings)?;
         Some(Self { rings, step })
@@ -65,6 +68,21 @@ impl Rings {
 }
 
 impl Ring {
+    /// Rise of the beam for each metre of horizontal distance in a direction, by the returns on both sides of it: the beams of a scanner
+    /// that leans rise on one side and fall on the other.
+    pub fn slope(&self, azimuth: f64) -> f64 {
+        let count = self.returns.len();
+        let next = self.returns.partition_point(|r| r.azimuth < azimuth);
+        let around = |k: usize, round: f64| self.returns[k % count].ahead(round);
+        let (a, b) = if next == 0 {
+            (around(count - 1, -TAU), around(0, 0.0))
+        } else {
+            (around(next - 1, 0.0), around(next, if next == count { TAU } else { 0.0 }))
+        };
+        let gap = b.0 - a.0;
+        if gap > 0.0 { a.1 + (b.1 - a.1) * (azimuth - a.0) / gap } else { a.1 }
+    }
+
     /// Returns with azimuths within `half` of a direction, going on at −π.
     pub fn within(&self, azimuth: f64, half: f64) -> impl Iterator<Item = &Return> {
         let (low, high) = (azimuth - half, azimuth + half);

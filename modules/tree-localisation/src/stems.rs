@@ -290,14 +290,15 @@ fn confirmed(stem: Stem, turns: &[Revolution], rules: &StemRules) -> Option<Stem
         for ring in &turn.rings.rings {
             let (x, y) = (stem.place[0] - turn.eye[0], stem.place[1] - turn.eye[1]);
             let level = libm::hypot(x, y);
-            let height = turn.eye[2] + ring.slope * level - stem.ground;
+            let seen_at = |x: f64, y: f64| libm::atan2(-sine * x + cosine * y, cosine * x + sine * y);
+            let height = turn.eye[2] + ring.slope(seen_at(x, y)) * level - stem.ground;
             if !(rules.heights_m[0]..rules.heights_m[1]).contains(&height) || level < stem.diameter {
                 continue;
             }
             // where the leaning axis passes this beam
             let [x, y] =
                 [x + stem.lean[0] * (height - BREAST_HEIGHT), y + stem.lean[1] * (height - BREAST_HEIGHT)];
-            let azimuth = libm::atan2(-sine * x + cosine * y, cosine * x + sine * y);
+            let azimuth = seen_at(x, y);
             let half = (0.35 * stem.diameter / level).max(0.75 * turn.rings.step);
             let [mut on, mut before, mut behind] = [0_u32; 3];
             for r in ring.within(azimuth, half) {

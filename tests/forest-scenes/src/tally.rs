@@ -85,7 +85,8 @@ impl TrialRow {
     pub fn model(&self) -> MatchModel {
         let survey = self.kind.survey;
         let (noise_m, matched) = (survey.noise_m.max(0.05), (1.0 - survey.missing) * 0.95);
-        MatchModel { noise_m, matched, ..MatchModel::default() }
+        let diameter_m = self.kind.diameter_m.unwrap_or(MatchModel::default().diameter_m);
+        MatchModel { noise_m, matched, diameter_m }
     }
 
     /// The prior of a trial.

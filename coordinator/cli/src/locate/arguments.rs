@@ -26,6 +26,9 @@ pub struct LocateArguments {
     /// Deviation of the places of the map, m.
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = parse_noise)]
     pub map_noise: f64,
+    /// Deviation of the diameters of the map, m.
+    #[arg(long, value_name = "M", default_value_t = 0.03, value_parser = parse_noise)]
+    pub map_diameter: f64,
     /// Share of the trees that the map lacks.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = parse_share)]
     pub missing: f64,

@@ -31,7 +31,7 @@ pub fn locate(a: &LocateArguments) -> Result<Exit> {
     let maps: Vec<Vec<LocalTree>> =
         detections.iter().map(|d| d.stems.iter().map(LocalTree::from).collect()).collect();
     let local = merged(&maps);
-    let model = MatchModel { noise_m: a.map_noise, matched: 1.0 - a.missing, ..MatchModel::default() };
+    let model = MatchModel { noise_m: a.map_noise, matched: 1.0 - a.missing, diameter_m: a.map_diameter };
     let matcher = Matcher::with(map, model);
     let answer = matcher.find(&local, a.prior().as_ref());
     if let Some(path) = &a.picture {

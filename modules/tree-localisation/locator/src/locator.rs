@@ -1,7 +1,7 @@
 //! The subsystem: takes messages and odometry, and answers with a pose, how far it may be wrong, and whether to believe it.
 
 use crate::cloud::Cloud;
-use crate::look::{Looker, Sighting};
+use crate::look::{Attitude, Looker, Sighting};
 use crate::settings::{Settings, schema};
 use crate::shown::{Shown, ellipse};
 use crate::variables as id;
@@ -16,7 +16,7 @@ use terraglue_tree_localisation::{
 };
 
 /// Form of the serialized state.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Most bytes of a message of the stream `match`.
 const MOST_BYTES: u32 = 1 << 20;
 
@@ -131,19 +131,20 @@ impl TreeLocator {
         self.table.show(id::REFUSED, self.table.value(id::REFUSED) + 1.0);
     }
 
-    /// Trees of all scans that have come, in the frame of the machine; none: no scan has come.
+    /// Trees of all scans that have come, in the frame of the machine turned level; none: no scan has come.
     fn look(&mut self, world: &dyn World) -> Result<Option<Sighting>> {
         let mut sighting = None;
         for k in 1..self.state.fresh.len() {
             if !std::mem::take(&mut self.state.fresh[k]) {
                 continue;
             }
-            let motion = [id::SPEED, id::TURN_RATE].map(|k| self.table.value(k));
+            let values = |ids: [u32; 2]| ids.map(|k| self.table.value(k));
+            let attitude = Attitude::new(values([id::SPEED, id::TURN_RATE]), values([id::ROLL, id::PITCH]));
             let mask = self.table.value(id::MASK) as usize;
             match Cloud::read(&self.state.messages[k].0) {
                 Ok(cloud) => {
                     let out = sighting.get_or_insert_with(Sighting::default);
-                    self.looker.see(&mut self.settings, (k, &cloud), motion, mask, world, out)?;
+                    self.looker.see(&mut self.settings, (k, &cloud), &attitude, mask, world, out)?;
                     self.table.show(id::SCANS, self.table.value(id::SCANS) + 1.0);
                 }
                 Err(why) => self.refuse(&format!("points_{k}"), &why.to_string()),

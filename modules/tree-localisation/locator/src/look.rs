@@ -1,4 +1,4 @@
-//! From the points of a scan to the trees around the machine, in its frame.
+//! From the points of a scan to the trees around the machine, in its frame turned level.
 
 use crate::cloud::Cloud;
 use crate::own::OwnBodies;
@@ -26,6 +26,24 @@ pub(crate) struct Looker {
     boxes: Vec<Volume>,
 }
 
+/// How the machine stands and moves while it scans.
+pub(crate) struct Attitude {
+    /// Speed along x, m/s, and rate of turning about the vertical, rad/s.
+    pub speed: f64,
+    pub turn_rate: f64,
+    /// Turns directions of the mount into its frame turned level.
+    level: Pose,
+}
+
+impl Attitude {
+    /// With this roll and pitch, rad.
+    pub fn new([speed, turn_rate]: [f64; 2], [roll, pitch]: [f64; 2]) -> Self {
+        let [(sr, cr), (sp, cp)] = [roll, pitch].map(|a| (libm::sin(0.5 * a), libm::cos(0.5 * a)));
+        let level = Pose { orientation: [cp * cr, cp * sr, sp * cr, -sp * sr], ..Pose::IDENTITY };
+        Self { speed, turn_rate, level }
+    }
+}
+
 /// How far beyond its boxes a stem still counts as the machine itself, m.
 const BESIDE: f64 = 0.2;
 /// Values of the mask: by the body of a point, by the boxes around bodies.
@@ -33,12 +51,12 @@ const BY_BODY: usize = 1;
 const BY_VOLUME: usize = 2;
 
 impl Looker {
-    /// Stems of the scan at an input; `motion`: speed, m/s, and rate of turning, rad/s.
+    /// Stems of the scan at an input.
     pub fn see(
         &mut self,
         settings: &mut Settings,
         (input, cloud): (usize, &Cloud),
-        motion: [f64; 2],
+        attitude: &Attitude,
         mask: usize,
         world: &dyn World,
         out: &mut Sighting,
@@ -54,9 +72,9 @@ impl Looker {
             );
             return Err(Error::Failed(why));
         }
-        let filter = self.filter(settings, mask, world)?;
+        let filter = self.filter(settings, (mask, attitude), world)?;
         let own = self.own.as_ref().map_or(u32::MAX, |own| own.subsystem);
-        let scan = straightened(settings, cloud, own, motion);
+        let scan = straightened(settings, cloud, own, attitude);
         let detector = Detector { filter, ..Detector::default() };
         let found = detector.detect(&scan);
         let is_own = |place: [f64; 2]| {
@@ -71,13 +89,18 @@ impl Looker {
     }
 
     /// The filter of a scan, with the present boxes around the bodies.
-    fn filter(&mut self, settings: &mut Settings, mask: usize, world: &dyn World) -> Result<Filter> {
+    fn filter(
+        &mut self,
+        settings: &mut Settings,
+        (mask, attitude): (usize, &Attitude),
+        world: &dyn World,
+    ) -> Result<Filter> {
         let frame = settings.mount.state(world, world.time())?.world_from_body;
         let own = match self.own.take() {
             Some(own) => own,
             None => OwnBodies::find(&settings.own_bodies, &settings.mount, world)?,
         };
-        own.volumes(&frame, world, world.time(), &mut self.boxes);
+        own.volumes([&frame, &attitude.level], world, world.time(), &mut self.boxes);
         let filter = Filter {
             range_m: settings.range_m,
             own_bodies: if mask == BY_BODY { own.bodies.clone() } else { Vec::new() },
@@ -89,13 +112,14 @@ impl Looker {
     }
 }
 
-/// Points of a turn in the frame of the machine at its end: its motion during the turn is removed.
-fn straightened(settings: &Settings, cloud: &Cloud, own: u32, [speed, turn_rate]: [f64; 2]) -> Scan {
+/// Points of a turn in the frame of the machine at its end, turned level: its motion during the turn is removed.
+fn straightened(settings: &Settings, cloud: &Cloud, own: u32, attitude: &Attitude) -> Scan {
+    let Attitude { speed, turn_rate, level } = attitude;
     let base = settings.mount.body_from_sensor();
     let pose = cloud.pose.unwrap_or(Pose::IDENTITY);
     let place = |p: [f64; 3]| {
         let point = pose.point(p);
-        base.turned_back([0, 1, 2].map(|k| point[k] - base.position[k]))
+        level.turned(base.turned_back([0, 1, 2].map(|k| point[k] - base.position[k])))
     };
     let points = cloud.points.iter().map(|p| {
         let [x, y, z] = place(p.position);

@@ -43,14 +43,14 @@ impl OwnBodies {
         Ok(Self { subsystem: place as u32, bodies })
     }
 
-    /// Boxes around the shapes of the bodies in the frame of a pose, at a time.
-    pub fn volumes(&self, frame: &Pose, world: &dyn World, time: f64, out: &mut Vec<Volume>) {
+    /// Boxes around the shapes of the bodies at a time, in the frame of a pose that is turned level.
+    pub fn volumes(&self, [frame, level]: [&Pose; 2], world: &dyn World, time: f64, out: &mut Vec<Volume>) {
         out.clear();
         let Some(scene) = world.scene(self.subsystem) else { return };
         for body in &self.bodies {
             let whole = BodyRef { subsystem: self.subsystem, body: *body };
             let Some(state) = world.pose(whole, time) else { continue };
-            out.extend(boxes(scene, *body, &state.world_from_body, frame));
+            out.extend(boxes(scene, *body, &state.world_from_body, [frame, level]));
         }
     }
 }
@@ -60,7 +60,7 @@ fn boxes<'a>(
     scene: &'a Scene,
     body: u32,
     pose: &'a Pose,
-    frame: &'a Pose,
+    [frame, level]: [&'a Pose; 2],
 ) -> impl Iterator<Item = Volume> + 'a {
     scene.shapes.iter().filter(move |s| s.body == body).map(move |shape| {
         let [low, high] = shape.geometry.extent();
@@ -68,7 +68,7 @@ fn boxes<'a>(
         for corner in 0..8_usize {
             let at = [0, 1, 2].map(|k| if corner >> k & 1 == 0 { low[k] } else { high[k] });
             let world = pose.point(shape.body_from_shape.point(at));
-            let local = frame.turned_back([0, 1, 2].map(|k| world[k] - frame.position[k]));
+            let local = level.turned(frame.turned_back([0, 1, 2].map(|k| world[k] - frame.position[k])));
             for k in 0..3 {
                 from[k] = from[k].min(local[k] - MARGIN);
                 to[k] = to[k].max(local[k] + MARGIN);

@@ -50,6 +50,7 @@ pub fn schema() -> Schema {
         .within(1.0, MOST_SCANNERS),
         Parameter::of("map", ParameterType::Path, table).optional(),
         part("map_noise_m", "m", model.noise_m, "Standard deviation of a place of the map along each axis"),
+        part("map_diameter_m", "m", model.diameter_m, "Standard deviation of a diameter of the map"),
         Parameter::number("matched", "", model.matched, "Share of the trees that are seen and on the map")
             .within(0.05, 0.98),
         part("drift", "", rules.drift, "Error of the odometry for each metre"),
@@ -98,7 +99,7 @@ impl Settings {
             model: MatchModel {
                 noise_m: of("map_noise_m")?,
                 matched: of("matched")?,
-                ..MatchModel::default()
+                diameter_m: of("map_diameter_m")?,
             },
             rules: TrackRules {
                 drift: of("drift")?,

@@ -11,30 +11,32 @@ pub(crate) const TURN_RATE: u32 = 4;
 pub(crate) const GNSS_X: u32 = 5;
 pub(crate) const GNSS_Y: u32 = 6;
 pub(crate) const GNSS_DEVIATION: u32 = 7;
-pub(crate) const MASK: u32 = 8;
-pub(crate) const X: u32 = 9;
-pub(crate) const Y: u32 = 10;
-pub(crate) const YAW: u32 = 11;
-pub(crate) const STATUS: u32 = 12;
-pub(crate) const IS_KNOWN: u32 = 13;
-pub(crate) const BOUND: u32 = 14;
-pub(crate) const LONG_AXIS: u32 = 15;
-pub(crate) const SHORT_AXIS: u32 = 16;
-pub(crate) const AXIS_ANGLE: u32 = 17;
-pub(crate) const SCORE: u32 = 18;
-pub(crate) const RUNNER_UP: u32 = 19;
-pub(crate) const FALSE_MATCHES: u32 = 20;
-pub(crate) const MATCHED: u32 = 21;
-pub(crate) const TREES: u32 = 22;
-pub(crate) const STEMS: u32 = 23;
-pub(crate) const OWN_STEMS: u32 = 24;
-pub(crate) const HIDDEN: u32 = 25;
-pub(crate) const SCANS: u32 = 26;
-pub(crate) const REFUSED: u32 = 27;
-pub(crate) const ERROR: u32 = 28;
-pub(crate) const BEYOND: u32 = 29;
+pub(crate) const ROLL: u32 = 8;
+pub(crate) const PITCH: u32 = 9;
+pub(crate) const MASK: u32 = 10;
+pub(crate) const X: u32 = 11;
+pub(crate) const Y: u32 = 12;
+pub(crate) const YAW: u32 = 13;
+pub(crate) const STATUS: u32 = 14;
+pub(crate) const IS_KNOWN: u32 = 15;
+pub(crate) const BOUND: u32 = 16;
+pub(crate) const LONG_AXIS: u32 = 17;
+pub(crate) const SHORT_AXIS: u32 = 18;
+pub(crate) const AXIS_ANGLE: u32 = 19;
+pub(crate) const SCORE: u32 = 20;
+pub(crate) const RUNNER_UP: u32 = 21;
+pub(crate) const FALSE_MATCHES: u32 = 22;
+pub(crate) const MATCHED: u32 = 23;
+pub(crate) const TREES: u32 = 24;
+pub(crate) const STEMS: u32 = 25;
+pub(crate) const OWN_STEMS: u32 = 26;
+pub(crate) const HIDDEN: u32 = 27;
+pub(crate) const SCANS: u32 = 28;
+pub(crate) const REFUSED: u32 = 29;
+pub(crate) const ERROR: u32 = 30;
+pub(crate) const BEYOND: u32 = 31;
 /// Number of those above.
-const NUMBERS: u32 = 30;
+const NUMBERS: u32 = 32;
 /// The global map.
 pub(crate) const MAP: u32 = NUMBERS;
 /// Points of the first scanner.
@@ -67,6 +69,13 @@ fn inputs() -> Vec<Variable> {
         input(GNSS_Y, "gnss_y", "m", "Place along y that GNSS shows"),
         input(GNSS_DEVIATION, "gnss_deviation", "m", "Deviation that GNSS claims; 0: it shows nothing")
             .within(0.0, 1e6),
+        input(
+            ROLL,
+            "roll",
+            "rad",
+            "Roll of the mount, as an inclinometer shows it: scans are turned level by it",
+        ),
+        input(PITCH, "pitch", "rad", "Pitch of the mount; both are 0 where nothing is connected"),
         mask.named(&MASKS),
     ]
 }

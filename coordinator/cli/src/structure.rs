@@ -9,7 +9,7 @@ use terraglue_fmi::description::Variable;
 use terraglue_fmi::export::{Compression, Content, pack};
 use terraglue_fmi::ssp::{self, NewComponent, NewConnection};
 use terraglue_fmi::{Fmu, ModelDescription};
-use terraglue_fmu::start_values;
+use terraglue_fmu::{host_keys, start_values};
 use terraglue_scenario::{Connection, ConnectionOrder, Extrapolate, InputError, Scenario, SubsystemSpec};
 use terraglue_subsystem::ValueType;
 
@@ -69,8 +69,13 @@ fn notes(scenario: &Scenario) {
         "note: a system structure names no communication step: {} s is left to the master",
         scenario.time.step_s
     );
-    for spec in scenario.subsystems.iter().filter(|s| s.step_multiple > 1) {
-        eprintln!("note: `step_multiple` of `{}` is left out", spec.name);
+    for spec in &scenario.subsystems {
+        let own = host_keys(&spec.parameters);
+        let of_run = [("step_multiple", spec.step_multiple > 1), ("isolate", spec.isolate)];
+        let of_run = of_run.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key);
+        for key in own.into_iter().chain(of_run) {
+            eprintln!("note: `{key}` of `{}` is left out: the master that runs the system sets it", spec.name);
+        }
     }
     let ordered =
         |c: &&Connection| c.order != ConnectionOrder::Structure || c.extrapolate != Extrapolate::Constant;

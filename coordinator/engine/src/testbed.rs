@@ -244,10 +244,10 @@ impl Testbed {
 
     /// (2) Outputs of t become inputs of the step of length h; `repeated`: of one that was discarded with a greater length.
     fn transfer_signals(&mut self, h: f64, repeated: bool) -> Result {
-        let instances = &mut self.subsystems.instances;
         if self.clock.index == 0 && self.clock.t == 0.0 && !repeated {
-            self.signals.initialize(instances)?;
+            self.end_initialization()?;
         }
+        let instances = &mut self.subsystems.instances;
         let (t_s, events) = (self.clock.t, &mut self.events);
         let moment = Moment { t: t_s, h, nominal: self.clock.nominal };
         if repeated {

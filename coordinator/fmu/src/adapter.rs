@@ -31,7 +31,7 @@ pub struct FmuSubsystem {
     open: bool,
     /// Whether the initialisation is over.
     running: bool,
-    /// Whether it has been initialised, if only before it went back.
+    /// Whether it has made a step, if only before it went back.
     begun: bool,
     /// Whether any variable is a clock or belongs to one.
     clocks: bool,
@@ -247,13 +247,15 @@ impl FmuSubsystem {
         if begins {
             self.instance.exit_initialization().map_err(error)?;
             self.running = true;
-            if !std::mem::replace(&mut self.begun, true) {
-                opening::warn_of_length(self.instance.description(), step.h, &*self.host);
-            }
         }
-        if step.h == 0.0 && self.has_bodies {
-            self.bodies.still(&mut self.instance, step, wrench, out, error)?;
+        if step.h == 0.0 {
+            if self.has_bodies {
+                self.bodies.still(&mut self.instance, step, wrench, out, error)?;
+            }
             return Ok(false);
+        }
+        if !std::mem::replace(&mut self.begun, true) {
+            opening::warn_of_length(self.instance.description(), step.h, &*self.host);
         }
         if self.open && !self.can_go_back {
             let text =
@@ -448,7 +450,7 @@ impl Subsystem for FmuSubsystem {
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         let Input::Force { t: wrench, .. } = *input else { return Err(Error::Unsupported) };
-        if (self.open || !self.running || self.clocks || self.can_go_back || self.has_bodies)
+        if (step.h == 0.0 || self.open || !self.running || self.clocks || self.can_go_back || self.has_bodies)
             && !self.prepare(step, wrench, out)?
         {
             return Ok(());

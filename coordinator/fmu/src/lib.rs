@@ -24,7 +24,7 @@ pub mod trace;
 
 pub use adapter::FmuSubsystem;
 pub use driven_bodies::DrivenBodiesModule;
-pub use settings::{OnNan, start_values};
+pub use settings::{OnNan, host_keys, start_values};
 
 use terraglue_host::Library;
 

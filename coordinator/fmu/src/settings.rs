@@ -105,7 +105,21 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
             _ => flatten(key.clone(), value, &mut start),
         }
     }
+    if let Some(stop) = options.stop_time_s.filter(|stop| *stop <= options.start_time_s) {
+        let begins = options.start_time_s;
+        return Err(Error::Refused(format!(
+            "`stop_time_s` = {stop} is not after `start_time_s` = {begins}: the FMU would end before it begins"
+        )));
+    }
     Ok((options, start))
+}
+
+/// Keys of the host in the table of an FMU, which are no start values.
+pub fn host_keys(parameters: &Map<String, Value>) -> Vec<&str> {
+    const KEYS: [&str; 10] = [
+        "on_nan", "event_mode", "rollback", "strict", "trace", "tolerance", "start_time_s", "stop_time_s", "log_categories", "bodies",
+    ];
+    KEYS.into_iter().filter(|key| parameters.contains_key(*key)).collect()
 }
 
 /// Start values in the table of an FMU, without the keys of the host.

@@ -58,6 +58,8 @@ pub struct Tables<'a> {
 
 /// Share of a step that a number of steps may be off a whole one: it was typed with so many digits.
 const NEARLY_WHOLE: f64 = 1e-5;
+/// Share of a step that is rounding.
+const ROUNDED: f64 = 1e-9;
 /// Longest run, in steps.
 const STEPS: f64 = 1e9;
 
@@ -87,7 +89,7 @@ pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
 /// Errors of the FMU or its input, with the time.
 pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
     let row = &mut *tables.rows;
-    let Plan { start, stop, step, steps, whole } = plan(fmu, settings)?;
+    let Plan { start, stop, step, steps } = plan(fmu, settings)?;
     let intermediate = match &tables.intermediate {
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
@@ -107,7 +109,9 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let all = self::columns(&description, &intermediate, false)?;
         write(&(header(&all) + ",step_finished"))?;
     }
-    if !whole && !description.capabilities.variable_step {
+    let variable = description.capabilities.variable_step;
+    let length = stop - start;
+    if !variable && length - steps * step > ROUNDED * step {
         let end = start + steps * step;
         instance.note(&format!(
             "the run ends at t = {end} s, before {stop} s: the FMU takes steps of one length only"
@@ -122,13 +126,16 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         if ended.is_some() {
             return Ok(());
         }
-        let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
-        let end = if whole { end } else { end.min(stop) };
+        // times since the start lie on the grid of a scenario, whose FMUs make the same steps
+        let (from, to) = (k as f64 * step, (k + 1) as f64 * step);
+        let is_last = variable && k + 1 == steps as u64 && (to - length).abs() > ROUNDED * step;
+        let to = if is_last { length } else { to };
+        let (t, end) = (start + from, start + to);
         let at = |e: Error| named(e, t);
         inputs.set(&mut instance, t).map_err(at)?;
         instance.clocks_mut().forget_ticks();
         let events;
-        let step = halving(&mut instance, &inputs, &mut before, (t, end), &mut tables.intermediate);
+        let step = halving(&mut instance, &inputs, &mut before, (start, from, to), &mut tables.intermediate);
         (ended, events) = step.map_err(|e| at(inputs.way_out(e, end)))?;
         let now = ended.unwrap_or(end);
         row(&marked(values.at(&instance, now).map_err(|e| named(e, now))?, events))
@@ -168,8 +175,6 @@ struct Plan {
     stop: f64,
     step: f64,
     steps: f64,
-    /// Whether the step divides the run.
-    whole: bool,
 }
 
 /// From when to when, and in how many steps: as the settings say, else the FMU.
@@ -192,7 +197,7 @@ fn plan(fmu: &Fmu, settings: &Settings) -> Result<Plan> {
     if !(step > 0.0 && (1.0..=STEPS).contains(&steps)) {
         return Err(Error::WrongInput(no_steps(start, stop, step)));
     }
-    Ok(Plan { start, stop, step, steps, whole })
+    Ok(Plan { start, stop, step, steps })
 }
 
 /// Start values and the initialisation from a start to a stop; the inputs over time, which are set.
@@ -234,24 +239,26 @@ impl Before {
     }
 }
 
-/// A step, in halves where the FMU discards it and can go back. Answers when the FMU asked for the end, and how many
-/// events there were.
+/// A step between two times after the start, in halves where the FMU discards it and can go back, as a scenario halves it. Answers
+/// when the FMU asked for the end, and how many events there were.
 fn halving(
     instance: &mut FmuInstance,
     inputs: &Inputs,
     before: &mut Before,
-    (start, end): (f64, f64),
+    (start, from, end): (f64, f64, f64),
     between: &mut Option<Line>,
 ) -> Result<(Option<f64>, u32)> {
     let variable_step = instance.description().capabilities.variable_step;
-    let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
-    while end - t > 1e-9 * (end - start) {
+    let (mut t, mut longest, mut halvings, mut events) = (from, end - from, 0, 0);
+    while end - t > 1e-6 * (end - from) {
         if before.saves {
             before.save(instance)?;
         }
-        let part = (t, if h >= end - t { end } else { t + h });
-        inputs.begin_part(instance, part, t == start && halvings == 0)?;
-        let made = instance.do_step(Advance { t, h: h.min(end - t), for_good: true });
+        let left = end - t;
+        let h = if left - longest <= ROUNDED * (end - from) { left } else { longest };
+        let next = if h == left { end } else { t + h };
+        inputs.begin_part(instance, (start + t, start + next), t == from && halvings == 0)?;
+        let made = instance.do_step(Advance { t: start + t, h, for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
             for row in instance.take_intermediate() {
                 let values: String = row.values.iter().map(|x| format!(",{}", exact(*x))).collect();
@@ -265,11 +272,11 @@ fn halving(
             Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
             Ok(done) => {
                 events += done.events;
-                t = if h >= end - t { end } else { t + h };
+                t = next;
             }
             Err(Error::Discard { .. }) if before.saves && variable_step && halvings < 10 => {
                 instance.restore(&before.state)?;
-                (h, halvings) = (0.5 * h, halvings + 1);
+                (longest, halvings) = (0.5 * h, halvings + 1);
             }
             Err(error) => return Err(error),
         }

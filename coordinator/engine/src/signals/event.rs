@@ -95,6 +95,11 @@ impl TimeLine {
         times.filter(|time| *time > t).fold(f64::INFINITY, f64::min)
     }
 
+    /// Whether an event at the start sets a variable.
+    pub fn sets_at_start(&self) -> bool {
+        self.events.iter().any(|e| e.trigger.time() <= 0.0 && !e.due.set.is_empty())
+    }
+
     /// Which events have fired, for a snapshot.
     pub fn fired(&self) -> Vec<bool> {
         self.events.iter().map(|e| e.fired).collect()

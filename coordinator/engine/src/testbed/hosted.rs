@@ -49,6 +49,7 @@ impl Testbed {
             "bits": bits,
             "counts": [kept.nominal, kept.index],
             "started": kept.started,
+            "initialised": kept.initialised,
             "before": before_bits(&kept.before),
             "fired": self.signals.time_line.fired(),
             "memory": self.glued.memory(self.signals.remember(), self.streams.remember()),
@@ -127,6 +128,7 @@ fn read_head(head: &Value) -> Option<Head> {
     let [step_s, origin_s, t] = [step, origin, t].map(f64::from_bits);
     let good = [step_s, origin_s, t].iter().all(|x| x.is_finite()) && step_s > 0.0;
     let started = head["started"].as_bool()?;
-    let kept = RunClock { step_s, origin_s, nominal, index, t, started, before };
+    let initialised = head["initialised"].as_bool()?;
+    let kept = RunClock { step_s, origin_s, nominal, index, t, started, initialised, before };
     good.then_some((kept, fired?, memory?))
 }

@@ -21,6 +21,8 @@ pub(super) struct RunClock {
     pub t: f64,
     /// Whether the time before t = 0 is over.
     pub started: bool,
+    /// Whether the connected start values have been passed on and the initialisation of FMUs has ended.
+    pub initialised: bool,
     /// Energies that were counted before t = 0.
     pub before: Energy,
 }
@@ -29,7 +31,7 @@ impl RunClock {
     /// At t = 0, before anything has been done.
     pub fn new(step_s: f64) -> Self {
         let before = Energy::default();
-        Self { step_s, origin_s: 0.0, nominal: 0, index: 0, t: 0.0, started: false, before }
+        Self { step_s, origin_s: 0.0, nominal: 0, index: 0, t: 0.0, started: false, initialised: false, before }
     }
 
     /// End of the present nominal step, s.

@@ -6,12 +6,13 @@
 
 use super::Testbed;
 use super::subsystems::Subsystems;
+use super::uncoupled::nothing;
 use crate::signals::StreamLink;
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::timing::Timings;
 use terraglue_gluing::{Outcome, StepReport};
-use terraglue_subsystem::{Energy, Kind};
+use terraglue_subsystem::{Energy, Input, Kind, Step};
 
 impl Testbed {
     /// Makes the steps before t = 0 that `time.settle_s` asks for. Once; the first step does it at the latest.
@@ -36,11 +37,32 @@ impl Testbed {
         if count > 0.0 {
             self.stand(count as u64)?;
         }
+        // an event at the start may set what can be set before the end of the initialisation only
+        let has_fmus = self.subsystems.schedules.iter().any(|turn| turn.is_fmu && !turn.glued);
+        if count == 0.0 && has_fmus && !self.signals.time_line.sets_at_start() {
+            self.end_initialization()?;
+        }
         self.streams.forget();
         self.signals.links.streams.iter_mut().for_each(StreamLink::forget);
         self.sight.begin(&self.clock, &mut self.subsystems)?;
         self.streams
             .collect(&self.subsystems.instances, |stream, bytes| self.signals.links.feed(stream, bytes))
+    }
+
+    /// Passes connected start values on and ends the initialisation of FMUs, by a step of no length: from then on they
+    /// show the outputs of the start. Once.
+    pub(super) fn end_initialization(&mut self) -> Result {
+        if std::mem::replace(&mut self.clock.initialised, true) {
+            return Ok(());
+        }
+        let Subsystems { instances, schedules, .. } = &mut self.subsystems;
+        self.signals.initialize(instances)?;
+        let fmus = instances.iter_mut().zip(schedules).filter(|(_, turn)| turn.is_fmu && !turn.glued);
+        for (instance, _) in fmus {
+            let none = Input::Force { t: &[], motion: None };
+            instance.advance(&Step::free(self.clock.t, 0.0, 0), &none, &mut nothing())?;
+        }
+        Ok(())
     }
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.

@@ -211,6 +211,6 @@ pub(super) fn commit(clock: &RunClock, (h, end): (f64, f64), subsystems: &mut Su
 }
 
 /// Response of a subsystem without ports.
-fn nothing() -> Response<'static> {
+pub(super) fn nothing() -> Response<'static> {
     Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: 0.0, flags: 0 }
 }

@@ -32,6 +32,8 @@ pub struct Exported {
     pub unproved: Option<String>,
     /// The oldest glibc that its library runs with, as `2.34`: that of the machine that built it, or older.
     pub glibc: Option<String>,
+    /// Subsystems that are isolated in the scenario and not in the FMU.
+    pub isolated: Vec<String>,
     /// Names that the version of the standard has no type for.
     pub left_out: Vec<String>,
 }
@@ -78,7 +80,9 @@ pub fn write(request: &Request) -> Result<Exported> {
     pack(&request.out, &entries, Compression::Deflate).map_err(plain)?;
     let can = opened.subsystem.capabilities();
     let state = can.has(Capabilities::STATE);
+    let isolated = scenario.subsystems.iter().filter(|s| s.isolate).map(|s| s.name.clone());
     Ok(Exported {
+        isolated: isolated.collect(),
         path: request.out.clone(),
         variables: opened.layout.entries.len(),
         states: [state, state && can.has(Capabilities::SERIALIZE)],
@@ -179,8 +183,18 @@ impl Bundle<'_> {
         }
     }
 
+    /// Keys that keep a subsystem in a process of its own: that is the affair of the master that loads the FMU.
+    fn forget_isolation(&mut self, spec: &SubsystemSpec) {
+        if let Some(table) = self.document.get_mut(&spec.name).and_then(Item::as_table_like_mut) {
+            for key in ["isolate", "load_timeout_s", "step_timeout_s", "memory_mb"] {
+                table.remove(key);
+            }
+        }
+    }
+
     fn subsystems(&mut self) -> Result {
         for spec in &self.scenario.subsystems {
+            self.forget_isolation(spec);
             if spec.is_fmu() {
                 let to =
                     self.take(&self.scenario.folder.join(&spec.module), format!("fmus/{}.fmu", spec.name))?;

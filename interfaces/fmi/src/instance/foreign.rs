@@ -265,10 +265,11 @@ impl Drop for ForeignInstance {
             std::mem::forget(self.loaded.clone());
             return;
         }
-        let free = match &self.api {
-            Api::Two(two) => two.free,
-            Api::Three(three) => three.free,
+        let (free, function) = match &self.api {
+            Api::Two(two) => (two.free, "fmi2FreeInstance"),
+            Api::Three(three) => (three.free, "fmi3FreeInstance"),
         };
+        self.trace(format_args!("{function}"));
         if let Some(free) = free {
             // SAFETY: a live instance, freed once.
             unsafe { free(self.component) };

@@ -160,6 +160,9 @@ impl FmuInstance {
         let path = resources(fmu)?;
         let logs = !options.log_categories.is_empty();
         let modes = (logs, event_mode);
+        let function =
+            if matches!(api, Api::Two(..)) { "fmi2Instantiate" } else { "fmi3InstantiateCoSimulation" };
+        log.trace(&function);
         let (component, callbacks) = match &api {
             Api::Two(two) => make_2(two, [&name, &token, &text(&file_uri(&path))?], logs, environment),
             Api::Three(three) => {
@@ -169,11 +172,10 @@ impl FmuInstance {
         };
         let component = component.unwrap_or(std::ptr::null_mut());
         if component.is_null() {
-            let function =
-                if matches!(api, Api::Two(..)) { "fmi2Instantiate" } else { "fmi3InstantiateCoSimulation" };
             let outcome = "made no instance (it returned NULL)".into();
             return Err(Error::Call { function, outcome, log: log.last(), fatal: true });
         }
+        log.trace(&"  an instance");
         let clocks = Clocks::new(&description.variables, event_mode, &log);
         let instance = Self {
             phase: InstancePhase::Instantiated,

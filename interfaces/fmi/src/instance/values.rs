@@ -67,15 +67,16 @@ impl ForeignInstance {
     ///
     /// # Errors
     /// [`Error::Refused`]: a type that this version of FMI does not have. [`Error::Call`]: the FMU failed.
-    pub fn get(&self, references: &[u32], out: ValuesMut) -> Result {
+    pub fn get(&self, references: &[u32], mut out: ValuesMut) -> Result {
         if let ValuesMut::F64(out) = out {
             return self.get_f64(references, out);
         }
-        self.trace(format_args!("values of {references:?}"));
         match self.api {
-            Api::Two(..) => self.get_2(references, out),
-            Api::Three(..) => self.get_3(references, out),
-        }
+            Api::Two(..) => self.get_2(references, &mut out),
+            Api::Three(..) => self.get_3(references, &mut out),
+        }?;
+        self.trace(format_args!("  {references:?}: {out:?}"));
+        Ok(())
     }
 
     /// New values.
@@ -94,7 +95,7 @@ impl ForeignInstance {
         }
     }
 
-    fn get_2(&self, references: &[u32], out: ValuesMut) -> Result {
+    fn get_2(&self, references: &[u32], out: &mut ValuesMut) -> Result {
         let Api::Two(two) = self.api else { return Err(Error::Refused("not of FMI 2.0".into())) };
         let (r, n) = (references.as_ptr(), references.len());
         let mut integers = vec![0_i32; n];
@@ -163,7 +164,7 @@ impl ForeignInstance {
         }
     }
 
-    fn get_3(&self, references: &[u32], out: ValuesMut) -> Result {
+    fn get_3(&self, references: &[u32], out: &mut ValuesMut) -> Result {
         let Api::Three(three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
         match out {
             ValuesMut::F64(out) => self.get_f64(references, out),

@@ -50,7 +50,9 @@ pub fn export(arguments: &ExportArguments) -> terraglue_diagnostics::Result<Exit
         eprintln!("warning: it brings no results of its first steps with it: {why}");
     }
     for name in exported.isolated {
-        eprintln!("note: `{name}` runs in the process of the master that loads the FMU: `isolate` is left out");
+        eprintln!(
+            "note: `{name}` runs in the process of the master that loads the FMU: `isolate` is left out"
+        );
     }
     for name in exported.left_out {
         eprintln!("warning: `{name}` is left out: FMI {fmi}.0 has no type for it");

@@ -74,7 +74,10 @@ fn notes(scenario: &Scenario) {
         let of_run = [("step_multiple", spec.step_multiple > 1), ("isolate", spec.isolate)];
         let of_run = of_run.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key);
         for key in own.into_iter().chain(of_run) {
-            eprintln!("note: `{key}` of `{}` is left out: the master that runs the system sets it", spec.name);
+            eprintln!(
+                "note: `{key}` of `{}` is left out: the master that runs the system sets it",
+                spec.name
+            );
         }
     }
     let ordered =

@@ -117,7 +117,16 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
 /// Keys of the host in the table of an FMU, which are no start values.
 pub fn host_keys(parameters: &Map<String, Value>) -> Vec<&str> {
     const KEYS: [&str; 10] = [
-        "on_nan", "event_mode", "rollback", "strict", "trace", "tolerance", "start_time_s", "stop_time_s", "log_categories", "bodies",
+        "on_nan",
+        "event_mode",
+        "rollback",
+        "strict",
+        "trace",
+        "tolerance",
+        "start_time_s",
+        "stop_time_s",
+        "log_categories",
+        "bodies",
     ];
     KEYS.into_iter().filter(|key| parameters.contains_key(*key)).collect()
 }

@@ -129,13 +129,19 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         // times since the start lie on the grid of a scenario, whose FMUs make the same steps
         let (from, to) = (k as f64 * step, (k + 1) as f64 * step);
         let is_last = variable && k + 1 == steps as u64 && (to - length).abs() > ROUNDED * step;
-        let to = if is_last { length } else { to };
+        let (to, nominal) = if is_last { (length, length - from) } else { (to, step) };
         let (t, end) = (start + from, start + to);
         let at = |e: Error| named(e, t);
         inputs.set(&mut instance, t).map_err(at)?;
         instance.clocks_mut().forget_ticks();
         let events;
-        let step = halving(&mut instance, &inputs, &mut before, (start, from, to), &mut tables.intermediate);
+        let step = halving(
+            &mut instance,
+            &inputs,
+            &mut before,
+            (start, from, to, nominal),
+            &mut tables.intermediate,
+        );
         (ended, events) = step.map_err(|e| at(inputs.way_out(e, end)))?;
         let now = ended.unwrap_or(end);
         row(&marked(values.at(&instance, now).map_err(|e| named(e, now))?, events))
@@ -245,17 +251,17 @@ fn halving(
     instance: &mut FmuInstance,
     inputs: &Inputs,
     before: &mut Before,
-    (start, from, end): (f64, f64, f64),
+    (start, from, end, nominal): (f64, f64, f64, f64),
     between: &mut Option<Line>,
 ) -> Result<(Option<f64>, u32)> {
     let variable_step = instance.description().capabilities.variable_step;
-    let (mut t, mut longest, mut halvings, mut events) = (from, end - from, 0, 0);
-    while end - t > 1e-6 * (end - from) {
+    let (mut t, mut longest, mut halvings, mut events) = (from, nominal, 0, 0);
+    while end - t > 1e-6 * nominal {
         if before.saves {
             before.save(instance)?;
         }
         let left = end - t;
-        let h = if left - longest <= ROUNDED * (end - from) { left } else { longest };
+        let h = if left - longest <= ROUNDED * nominal { left } else { longest };
         let next = if h == left { end } else { t + h };
         inputs.begin_part(instance, (start + t, start + next), t == from && halvings == 0)?;
         let made = instance.do_step(Advance { t: start + t, h, for_good: true });
@@ -276,7 +282,7 @@ fn halving(
             }
             Err(Error::Discard { .. }) if before.saves && variable_step && halvings < 10 => {
                 instance.restore(&before.state)?;
-                (longest, halvings) = (0.5 * h, halvings + 1);
+                (longest, halvings) = (0.5 * longest.min(left), halvings + 1);
             }
             Err(error) => return Err(error),
         }

@@ -31,7 +31,16 @@ impl RunClock {
     /// At t = 0, before anything has been done.
     pub fn new(step_s: f64) -> Self {
         let before = Energy::default();
-        Self { step_s, origin_s: 0.0, nominal: 0, index: 0, t: 0.0, started: false, initialised: false, before }
+        Self {
+            step_s,
+            origin_s: 0.0,
+            nominal: 0,
+            index: 0,
+            t: 0.0,
+            started: false,
+            initialised: false,
+            before,
+        }
     }
 
     /// End of the present nominal step, s.

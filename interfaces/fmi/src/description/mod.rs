@@ -1,6 +1,7 @@
 //! The model description of an FMU: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
 mod defects;
+mod details;
 pub(crate) mod element;
 mod model;
 mod resize;
@@ -78,6 +79,7 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
     };
     variables::read(root, &mut description)?;
     structure::read(root, &mut description)?;
+    description.problems.extend(details::problems(root, version, &description.experiment));
     Ok(description)
 }
 

@@ -245,7 +245,7 @@ impl Testbed {
     /// (2) Outputs of t become inputs of the step of length h; `repeated`: of one that was discarded with a greater length.
     fn transfer_signals(&mut self, h: f64, repeated: bool) -> Result {
         if self.clock.index == 0 && self.clock.t == 0.0 && !repeated {
-            self.end_initialization()?;
+            standing::end_initialization(&mut self.clock, &mut self.signals, &mut self.subsystems)?;
         }
         let instances = &mut self.subsystems.instances;
         let (t_s, events) = (self.clock.t, &mut self.events);

@@ -89,7 +89,8 @@ pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
 /// Errors of the FMU or its input, with the time.
 pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
     let row = &mut *tables.rows;
-    let Plan { start, stop, step, steps } = plan(fmu, settings)?;
+    let plan = plan(fmu, settings)?;
+    let Plan { start, stop, step, steps } = plan;
     let intermediate = match &tables.intermediate {
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
@@ -110,12 +111,8 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         write(&(header(&all) + ",step_finished"))?;
     }
     let variable = description.capabilities.variable_step;
-    let length = stop - start;
-    if !variable && length - steps * step > ROUNDED * step {
-        let end = start + steps * step;
-        instance.note(&format!(
-            "the run ends at t = {end} s, before {stop} s: the FMU takes steps of one length only"
-        ));
+    if !variable && stop - start - steps * step > ROUNDED * step {
+        instance.note(&plan.early());
     }
     let values = Row { columns: &columns, on_nan: settings.on_nan, warned: Cell::new(false) };
     row(&marked(header(&columns), 0))?;
@@ -126,10 +123,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         if ended.is_some() {
             return Ok(());
         }
-        // times since the start lie on the grid of a scenario, whose FMUs make the same steps
-        let (from, to) = (k as f64 * step, (k + 1) as f64 * step);
-        let is_last = variable && k + 1 == steps as u64 && (to - length).abs() > ROUNDED * step;
-        let (to, nominal) = if is_last { (length, length - from) } else { (to, step) };
+        let (from, to, nominal) = plan.interval(k, variable);
         let (t, end) = (start + from, start + to);
         let at = |e: Error| named(e, t);
         inputs.set(&mut instance, t).map_err(at)?;
@@ -181,6 +175,25 @@ struct Plan {
     stop: f64,
     step: f64,
     steps: f64,
+}
+
+impl Plan {
+    /// Step k: from when to when after the start, on the grid of a scenario, whose FMUs make the same steps, and its length by the
+    /// plan. The last one ends at the stop, where the FMU takes steps of any length.
+    fn interval(&self, k: u64, variable: bool) -> (f64, f64, f64) {
+        let (from, to) = (k as f64 * self.step, (k + 1) as f64 * self.step);
+        let length = self.stop - self.start;
+        match variable && k + 1 == self.steps as u64 && (to - length).abs() > ROUNDED * self.step {
+            true => (from, length, length - from),
+            false => (from, to, self.step),
+        }
+    }
+
+    /// Note on a run that ends before its time.
+    fn early(&self) -> String {
+        let (end, stop) = (self.start + self.steps * self.step, self.stop);
+        format!("the run ends at t = {end} s, before {stop} s: the FMU takes steps of one length only")
+    }
 }
 
 /// From when to when, and in how many steps: as the settings say, else the FMU.

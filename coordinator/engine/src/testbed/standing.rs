@@ -5,9 +5,10 @@
 //! counted since the start, by the testbed and by modules that offer the action `energy.restart`, counts from t = 0 on.
 
 use super::Testbed;
+use super::run_clock::RunClock;
 use super::subsystems::Subsystems;
 use super::uncoupled::nothing;
-use crate::signals::StreamLink;
+use crate::signals::{Signals, StreamLink};
 use std::sync::atomic::Ordering;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::timing::Timings;
@@ -40,29 +41,13 @@ impl Testbed {
         // an event at the start may set what can be set before the end of the initialisation only
         let has_fmus = self.subsystems.schedules.iter().any(|turn| turn.is_fmu && !turn.glued);
         if count == 0.0 && has_fmus && !self.signals.time_line.sets_at_start() {
-            self.end_initialization()?;
+            end_initialization(&mut self.clock, &mut self.signals, &mut self.subsystems)?;
         }
         self.streams.forget();
         self.signals.links.streams.iter_mut().for_each(StreamLink::forget);
         self.sight.begin(&self.clock, &mut self.subsystems)?;
         self.streams
             .collect(&self.subsystems.instances, |stream, bytes| self.signals.links.feed(stream, bytes))
-    }
-
-    /// Passes connected start values on and ends the initialisation of FMUs, by a step of no length: from then on they
-    /// show the outputs of the start. Once.
-    pub(super) fn end_initialization(&mut self) -> Result {
-        if std::mem::replace(&mut self.clock.initialised, true) {
-            return Ok(());
-        }
-        let Subsystems { instances, schedules, .. } = &mut self.subsystems;
-        self.signals.initialize(instances)?;
-        let fmus = instances.iter_mut().zip(schedules).filter(|(_, turn)| turn.is_fmu && !turn.glued);
-        for (instance, _) in fmus {
-            let none = Input::Force { t: &[], motion: None };
-            instance.advance(&Step::free(self.clock.t, 0.0, 0), &none, &mut nothing())?;
-        }
-        Ok(())
     }
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.
@@ -114,6 +99,26 @@ impl Testbed {
         self.clock.t = end;
         Ok(())
     }
+}
+
+/// Passes connected start values on and ends the initialisation of FMUs, by a step of no length: from then on they show the outputs
+/// of the start. Once.
+pub(super) fn end_initialization(
+    clock: &mut RunClock,
+    signals: &mut Signals,
+    subsystems: &mut Subsystems,
+) -> Result {
+    if std::mem::replace(&mut clock.initialised, true) {
+        return Ok(());
+    }
+    let Subsystems { instances, schedules, .. } = subsystems;
+    signals.initialize(instances)?;
+    let fmus = instances.iter_mut().zip(schedules).filter(|(_, turn)| turn.is_fmu && !turn.glued);
+    for (instance, _) in fmus {
+        let none = Input::Force { t: &[], motion: None };
+        instance.advance(&Step::free(clock.t, 0.0, 0), &none, &mut nothing())?;
+    }
+    Ok(())
 }
 
 /// Energy exchanged since a state with the ledger `before`.

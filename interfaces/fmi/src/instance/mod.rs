@@ -156,8 +156,7 @@ impl FmuInstance {
         let environment = Arc::as_ptr(&log).cast_mut().cast::<c_void>();
         let text =
             |text: &str| CString::new(text).map_err(|_| Error::Refused(format!("`{text}` has a zero in it")));
-        let (name, token) = (text(&options.name)?, text(&description.token)?);
-        let path = resources(fmu)?;
+        let (name, token, path) = (text(&options.name)?, text(&description.token)?, resources(fmu)?);
         let logs = !options.log_categories.is_empty();
         let modes = (logs, event_mode);
         let function =

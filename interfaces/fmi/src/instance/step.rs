@@ -249,7 +249,7 @@ impl FmuInstance {
         if early && last >= t - tolerance && last < stop {
             return PartEnd::Before;
         }
-        if self.is_of_solver(last, off) || (0.0..=PAST * (stop - t)).contains(&off) {
+        if is_of_solver(self, last, off) || (0.0..=PAST * (stop - t)).contains(&off) {
             own_time(self, last, stop);
             return PartEnd::Stop;
         }
@@ -258,15 +258,6 @@ impl FmuInstance {
             return PartEnd::Before;
         }
         PartEnd::Wrong
-    }
-
-    /// Whether a time that is `off` the end of a step may be that of a solver of its own: its times are sums of its steps.
-    fn is_of_solver(&self, last: f64, off: f64) -> bool {
-        let own = self.description.capabilities.fixed_step.unwrap_or(0.0);
-        let steps = (last - self.start) / own;
-        // each step adds a rounding
-        let rounded = 1e-6 + steps.abs() * f64::EPSILON * (1.0 + last.abs() / own);
-        off.abs() <= own * (1.0 + 1e-6) && (steps - steps.round()).abs() <= rounded
     }
 
     /// Event mode at `now`, with the clocks that tick there at the end of a part; whether the FMU asks for the end.
@@ -358,6 +349,15 @@ fn mode_changed(instance: &FmuInstance, function: &str) {
             "{function} changed how this thread rounds or treats tiny numbers; it is set back after each step"
         ));
     }
+}
+
+/// Whether a time that is `off` the end of a step may be that of a solver of its own: its times are sums of its steps.
+fn is_of_solver(of: &FmuInstance, last: f64, off: f64) -> bool {
+    let own = of.description.capabilities.fixed_step.unwrap_or(0.0);
+    let steps = (last - of.start) / own;
+    // each step adds a rounding
+    let rounded = 1e-6 + steps.abs() * f64::EPSILON * (1.0 + last.abs() / own);
+    off.abs() <= own * (1.0 + 1e-6) && (steps - steps.round()).abs() <= rounded
 }
 
 /// Notes once that the FMU reports the time of its own solver.

@@ -477,7 +477,7 @@ def test_a_moment_looks_the_same_live_and_replayed(walk, tmp_path):
             return steady(page, lambda: pixels(page))
 
         with served(walk) as recorded:
-            # a browser that has no time draws coarsely for as long: both are drawn again
+            # a busy browser may learn late which topics there are: both are drawn again
             for _ in range(4):
                 apart = different(of_the_run(), of_the_recording(recorded))
                 if apart < 0.01:

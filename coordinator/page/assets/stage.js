@@ -53,6 +53,7 @@ export class Stage {
     const { link, metadata } = this.run;
     const header = metadata["/ground/tiles"];
     if (header && !this.lattice) this.lay(header);
+    const known = this.subscribed.size;
     for (const topic of link.byTopic.keys()) {
       if (this.subscribed.has(topic)) continue;
       const take = this.taker(topic);
@@ -66,6 +67,8 @@ export class Stage {
         this.view.invalidate();
       });
     }
+    // the past was asked for before these topics were known
+    if (this.run.looked !== null && this.subscribed.size > known) this.show(this.run.looked);
   }
 
   // The lattice of the ground from the metadata of its topic.

@@ -197,6 +197,12 @@ pub struct Records<'a> {
     pub asked: &'a [String],
 }
 
+/// The first row of a record: outputs of FMUs are those at the end of their initialisation.
+fn record_start(testbed: &mut Testbed, recorder: &mut SharedRecorder) -> Result<()> {
+    testbed.end_initialization()?;
+    testbed.view(|view| recorder.started(view))
+}
+
 /// Steps a testbed to the end of its scenario and records it.
 pub fn run_testbed(
     testbed: Testbed,
@@ -222,7 +228,7 @@ pub fn run_testbed(
     let begun = testbed.begin();
     let begun = match goes_on {
         true => begun,
-        false => begun.and_then(|()| testbed.view(|view| recorder.started(view))),
+        false => begun.and_then(|()| record_start(&mut testbed, &mut recorder)),
     };
     let begun = begun.and_then(|()| write_exchange(folder, &testbed.explain()));
     clock.start();

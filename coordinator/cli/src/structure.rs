@@ -36,7 +36,7 @@ pub fn write(from: &Path, to: &Path) -> Result<Exit> {
     let text = ssp::describe((&scenario.name, &tool), scenario.time.duration_s, &components, &connections);
     entries.insert(0, ("SystemStructure.ssd".to_owned(), Content::Text(text)));
     pack(to, &entries, Compression::Deflate).map_err(|e| InputError::plain(e, None))?;
-    notes(&scenario);
+    notes(&scenario)?;
     outln!("{}: {} FMUs, {} connections", to.display(), components.len(), connections.len());
     Ok(Exit::Done)
 }
@@ -64,16 +64,16 @@ fn fits(scenario: &Scenario) -> Result {
 }
 
 /// Says what goes no further: how a master runs the system is its own affair.
-fn notes(scenario: &Scenario) {
+fn notes(scenario: &Scenario) -> Result {
     eprintln!(
         "note: a system structure names no communication step: {} s is left to the master",
         scenario.time.step_s
     );
     for spec in &scenario.subsystems {
-        let own = host_keys(&spec.parameters);
-        let of_run = [("step_multiple", spec.step_multiple > 1), ("isolate", spec.isolate)];
-        let of_run = of_run.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key);
-        for key in own.into_iter().chain(of_run) {
+        let mut keys = host_keys(&spec.parameters).map_err(|e| wrong(scenario, spec, e.to_string()))?;
+        keys.extend((spec.step_multiple > 1).then(|| "step_multiple".to_owned()));
+        keys.extend(spec.isolate.then(|| "isolate".to_owned()));
+        for key in keys {
             eprintln!(
                 "note: `{key}` of `{}` is left out: the master that runs the system sets it",
                 spec.name
@@ -85,6 +85,12 @@ fn notes(scenario: &Scenario) {
     if scenario.connections.iter().any(|c| ordered(&c)) {
         eprintln!("note: `order` and `extrapolate` of connections are left out");
     }
+    Ok(())
+}
+
+/// An error in the table of an FMU.
+fn wrong(scenario: &Scenario, spec: &SubsystemSpec, message: String) -> Box<InputError> {
+    scenario.source.error_about(&spec.name, &[&spec.name], message, None)
 }
 
 /// Start values of an FMU.
@@ -93,7 +99,7 @@ fn values(
     spec: &SubsystemSpec,
     description: &ModelDescription,
 ) -> Result<Vec<(String, ssp::Value)>> {
-    let wrong = |message: String| scenario.source.error_about(&spec.name, &[&spec.name], message, None);
+    let wrong = |message: String| wrong(scenario, spec, message);
     let all = start_values(&spec.parameters).map_err(|e| wrong(e.to_string()))?;
     let one = |(name, value): (String, Value)| {
         let real = description

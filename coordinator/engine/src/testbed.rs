@@ -440,18 +440,18 @@ impl Testbed {
     /// [`Error::Module`]: a module that cannot go back.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result {
         self.subsystems.instances.iter_mut().try_for_each(|i| i.restore_state(snapshot.slot))?;
-        self.restore_rest(snapshot)
+        restore_rest(self, snapshot)
     }
+}
 
-    /// Restores the content of a snapshot beside the states of the instances.
-    fn restore_rest(&mut self, snapshot: &Snapshot) -> Result {
-        self.clock = snapshot.clock;
-        self.signals.time_line.set_fired(&snapshot.fired);
-        let [mut signals, mut streams] = self.glued.recall(&snapshot.memory);
-        self.signals.recall(&mut signals);
-        self.streams.recall(&mut streams);
-        self.subsystems.read_states()
-    }
+/// Restores the content of a snapshot beside the states of the instances.
+fn restore_rest(testbed: &mut Testbed, snapshot: &Snapshot) -> Result {
+    testbed.clock = snapshot.clock;
+    testbed.signals.time_line.set_fired(&snapshot.fired);
+    let [mut signals, mut streams] = testbed.glued.recall(&snapshot.memory);
+    testbed.signals.recall(&mut signals);
+    testbed.streams.recall(&mut streams);
+    testbed.subsystems.read_states()
 }
 
 /// Without the digits that arithmetic leaves: 0.3 and not 0.30000000000000004.

@@ -217,11 +217,10 @@ pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result 
         ValueType::U16 => parsed!(U16, u16),
         ValueType::U32 => parsed!(U32, u32),
         ValueType::U64 => parsed!(U64, u64),
-        ValueType::Enumeration if v.items.iter().any(|(name, _)| name == text.trim()) => {
-            let item = v.items.iter().find(|(name, _)| name == text.trim()).ok_or_else(wrong)?;
-            instance.set(&[v.reference], Values::Enumeration(&[item.1]))
-        }
-        ValueType::Enumeration => parsed!(Enumeration, i64),
+        ValueType::Enumeration => match v.items.iter().find(|(name, _)| name == text.trim()) {
+            Some((_, item)) => instance.set(&[v.reference], Values::Enumeration(&[*item])),
+            None => parsed!(Enumeration, i64),
+        },
         ValueType::Bool => {
             let value = match text {
                 "true" | "1" => true,

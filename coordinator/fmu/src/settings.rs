@@ -47,6 +47,8 @@ pub struct Options {
     pub strict: bool,
     /// File that takes a line for each call, if any.
     pub trace: Option<PathBuf>,
+    /// Which of these keys are set.
+    pub keys: Vec<String>,
 }
 
 impl Default for Options {
@@ -62,6 +64,7 @@ impl Default for Options {
             log_categories: Vec::new(),
             strict: false,
             trace: None,
+            keys: Vec::new(),
         }
     }
 }
@@ -101,9 +104,14 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
             ("bodies", Value::Object(table)) => options.bodies = table.clone(),
             ("start", Value::Object(below)) => {
                 below.iter().for_each(|(k, v)| flatten(k.clone(), v, &mut start));
+                continue;
             }
-            _ => flatten(key.clone(), value, &mut start),
+            _ => {
+                flatten(key.clone(), value, &mut start);
+                continue;
+            }
         }
+        options.keys.push(key.clone());
     }
     if let Some(stop) = options.stop_time_s.filter(|stop| *stop <= options.start_time_s) {
         let begins = options.start_time_s;
@@ -114,21 +122,12 @@ pub fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String,
     Ok((options, start))
 }
 
-/// Keys of the host in the table of an FMU, which are no start values.
-pub fn host_keys(parameters: &Map<String, Value>) -> Vec<&str> {
-    const KEYS: [&str; 10] = [
-        "on_nan",
-        "event_mode",
-        "rollback",
-        "strict",
-        "trace",
-        "tolerance",
-        "start_time_s",
-        "stop_time_s",
-        "log_categories",
-        "bodies",
-    ];
-    KEYS.into_iter().filter(|key| parameters.contains_key(*key)).collect()
+/// Keys of the host that are set in the table of an FMU, which are no start values.
+///
+/// # Errors
+/// A key of the host with a value that it does not take.
+pub fn host_keys(parameters: &Map<String, Value>) -> Result<Vec<String>> {
+    Ok(options(parameters)?.0.keys)
 }
 
 /// Start values in the table of an FMU, without the keys of the host.

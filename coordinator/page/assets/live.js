@@ -116,7 +116,7 @@ function start() {
   keepAddress(run, stage, scope);
   // for scripts that drive the page
   document.addEventListener("terraglue:frames", (event) => event.detail(stage?.view.frames ?? 0));
-  document.addEventListener("terraglue:busy", (event) => event.detail(Boolean(stage?.busy || stage?.scaling)));
+  document.addEventListener("terraglue:busy", (event) => event.detail(Boolean(!Object.keys(run.metadata).length || stage?.busy || stage?.scaling)));
 }
 
 start();

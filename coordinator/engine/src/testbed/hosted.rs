@@ -83,7 +83,7 @@ impl Testbed {
             }
             rest = after;
         }
-        self.restore_rest(&Snapshot { slot: 0, clock: kept, fired, memory })
+        super::restore_rest(self, &Snapshot { slot: 0, clock: kept, fired, memory })
     }
 }
 

@@ -38,16 +38,25 @@ impl Testbed {
         if count > 0.0 {
             self.stand(count as u64)?;
         }
-        // an event at the start may set what can be set before the end of the initialisation only
-        let has_fmus = self.subsystems.schedules.iter().any(|turn| turn.is_fmu && !turn.glued);
-        if count == 0.0 && has_fmus && !self.signals.time_line.sets_at_start() {
-            end_initialization(&mut self.clock, &mut self.signals, &mut self.subsystems)?;
-        }
         self.streams.forget();
         self.signals.links.streams.iter_mut().for_each(StreamLink::forget);
         self.sight.begin(&self.clock, &mut self.subsystems)?;
         self.streams
             .collect(&self.subsystems.instances, |stream, bytes| self.signals.links.feed(stream, bytes))
+    }
+
+    /// Ends the initialisation of FMUs before the first step does, so that a recording begins with their outputs of the start. From then on
+    /// their parameters are fixed, so it is left to the first step where an event sets something at the start. After
+    /// [`Testbed::begin`].
+    ///
+    /// # Errors
+    /// An FMU that fails, or connected start values without a solution.
+    pub fn end_initialization(&mut self) -> Result {
+        let has_fmus = self.subsystems.schedules.iter().any(|turn| turn.is_fmu && !turn.glued);
+        if self.settle_s > 0.0 || !has_fmus || self.signals.time_line.sets_at_start() {
+            return Ok(());
+        }
+        end_initialization(&mut self.clock, &mut self.signals, &mut self.subsystems)
     }
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.

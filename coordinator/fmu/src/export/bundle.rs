@@ -183,18 +183,16 @@ impl Bundle<'_> {
         }
     }
 
-    /// Keys that keep a subsystem in a process of its own: that is the affair of the master that loads the FMU.
-    fn forget_isolation(&mut self, spec: &SubsystemSpec) {
-        if let Some(table) = self.document.get_mut(&spec.name).and_then(Item::as_table_like_mut) {
-            for key in ["isolate", "load_timeout_s", "step_timeout_s", "memory_mb"] {
-                table.remove(key);
-            }
+    /// A process of its own is the affair of the master that loads the FMU.
+    fn forget_isolation(&mut self, name: &str) {
+        if let Some(table) = self.document.get_mut(name).and_then(Item::as_table_like_mut) {
+            table.remove("isolate");
         }
     }
 
     fn subsystems(&mut self) -> Result {
         for spec in &self.scenario.subsystems {
-            self.forget_isolation(spec);
+            self.forget_isolation(&spec.name);
             if spec.is_fmu() {
                 let to =
                     self.take(&self.scenario.folder.join(&spec.module), format!("fmus/{}.fmu", spec.name))?;

@@ -1,48 +1,10 @@
 //! Defects of a description that do not make the FMU unusable: where it contradicts the standard, with line and element.
 
-use super::model::{Causality, Initial, ModelDescription, Start, Variability, Variable, Version};
+use super::model::{
+    Causality, Defect, DefectKind, Initial, ModelDescription, Start, Variability, Variable, Version,
+};
 use super::printable;
 use terraglue_subsystem::ValueType;
-
-/// Kinds of defects; of each, a run warns once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs)]
-pub enum DefectKind {
-    Enumeration,
-    Range,
-    StartRange,
-    StartCount,
-    StartMissing,
-    StartCalculated,
-    Unit,
-    BaseUnit,
-    Clock,
-    Role,
-    Continuous,
-    Derivative,
-    ClockReference,
-    Structure,
-}
-
-/// A defect of a description.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Defect {
-    /// Its kind.
-    pub kind: DefectKind,
-    /// Line in `modelDescription.xml`; none where an element is missing.
-    pub line: Option<u32>,
-    /// One sentence with the name of the variable.
-    pub message: String,
-}
-
-impl std::fmt::Display for Defect {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.line {
-            Some(line) => write!(f, "line {line}: {}", self.message),
-            None => f.write_str(&self.message),
-        }
-    }
-}
 
 /// Finds defects of one variable.
 type Rule = fn(&ModelDescription, &Variable) -> Option<String>;
@@ -77,7 +39,7 @@ impl ModelDescription {
     }
 }
 
-/// All defects, in the order of the variables.
+/// All defects, those of variables in their order first.
 fn all(description: &ModelDescription) -> Vec<Defect> {
     let own = description.variables.iter().filter(|v| !v.alias);
     let of_variable = |v| {
@@ -87,7 +49,10 @@ fn all(description: &ModelDescription) -> Vec<Defect> {
             Some(Defect { kind: *kind, line: Some(v.line), message })
         })
     };
-    own.flat_map(of_variable).chain(structure(description)).collect()
+    own.flat_map(of_variable)
+        .chain(structure(description))
+        .chain(description.details.iter().cloned())
+        .collect()
 }
 
 /// One warning for each kind of defect: the first of them, and how many more there are.

@@ -1,101 +1,102 @@
-//! Faults of attributes that a run does not need, and other tools may: display units, kinds of dependencies, the default experiment.
+//! Defects of attributes that a run does not need, and other tools may: display units, kinds of dependencies, the default experiment.
 
-use super::element::Element;
-use super::model::{Experiment, Version};
-use super::printable;
+use super::element::{Element, LineCounter};
+use super::model::{Defect, DefectKind, Experiment, Version};
+use super::{printable, types};
+use std::collections::BTreeSet;
 
 /// Kinds of dependencies in both standards (FMI 2.0.4 §2.2.8, FMI 3.0.2 §2.4.8).
 const KINDS: [&str; 5] = ["dependent", "constant", "fixed", "tunable", "discrete"];
 
-/// One warning for each kind of fault: the first of them, and how many more there are.
-pub fn problems(root: &Element, version: Version, experiment: &Experiment) -> Vec<String> {
-    let all = [display_units(root, version), kinds(root, version), of_experiment(root, experiment)];
-    let warning = |faults: &Vec<String>| match faults.as_slice() {
-        [] => None,
-        [one] => Some(one.clone()),
-        [first, more @ ..] => Some(format!("{first}; {} more like it", more.len())),
-    };
-    all.iter().filter_map(warning).collect()
+/// All of them.
+pub fn defects(root: &Element, version: Version, experiment: &Experiment) -> Vec<Defect> {
+    let mut all = display_units(root, version);
+    all.extend(dependency_kinds(root, version));
+    all.extend(of_experiment(root, experiment));
+    all
 }
 
 /// Display units that the unit does not define.
-fn display_units(root: &Element, version: Version) -> Vec<String> {
-    let units: Vec<Element> =
-        root.child("UnitDefinitions").iter().flat_map(|l| l.children().collect::<Vec<_>>()).collect();
-    let defines = |unit: &Element, name: &str| {
-        unit.children().any(|e| e.name() == "DisplayUnit" && e.attribute("name") == Some(name))
-    };
+fn display_units(root: &Element, version: Version) -> Vec<Defect> {
+    let known = units(root);
+    let of_unit = |unit: &str, shown: &str| unit == shown || known.contains(&(unit, shown));
+    let mut lines = LineCounter::of(root);
     let mut all = Vec::new();
-    for list in ["TypeDefinitions", "ModelVariables"] {
-        let elements = root.child(list).into_iter().flat_map(|l| l.children().collect::<Vec<_>>());
-        for element in elements {
-            // FMI 2.0 wraps the type, FMI 3.0 is the type
-            let inner = if version == Version::V2 { element.children().next() } else { Some(element) };
-            let Some(inner) = inner else { continue };
+    for list in root.children().filter(|e| ["TypeDefinitions", "ModelVariables"].contains(&e.name())) {
+        for element in list.children() {
+            let Some(inner) = types::inner(&element, version) else { continue };
             let Some(shown) = inner.attribute("displayUnit") else { continue };
-            let own = inner.attribute("unit");
-            let known = |unit: &Element| {
-                let name = unit.attribute("name");
-                (own.is_none() || name == own) && (defines(unit, shown) || name == Some(shown))
+            let is_known = match inner.attribute("unit") {
+                Some(unit) => of_unit(unit, shown),
+                // the unit is that of the declared type
+                None => known.iter().any(|(unit, name)| *name == shown || *unit == shown),
             };
-            if !units.iter().any(known) {
+            if !is_known {
                 let name = printable(element.attribute("name").unwrap_or("?"));
-                all.push(format!(
-                    "line {}: `{name}` has the display unit `{}`, which its unit does not define",
-                    element.line(),
-                    printable(shown)
-                ));
+                let shown = printable(shown);
+                let message =
+                    format!("`{name}` has the display unit `{shown}`, which its unit does not define");
+                all.push(Defect { kind: DefectKind::DisplayUnit, line: Some(lines.line(&element)), message });
             }
         }
+    }
+    all
+}
+
+/// Units with each of their display units; a unit without any stands with itself.
+fn units<'a>(root: &Element<'a>) -> BTreeSet<(&'a str, &'a str)> {
+    let mut all = BTreeSet::new();
+    let Some(list) = root.child("UnitDefinitions") else { return all };
+    for unit in list.children() {
+        let Some(name) = unit.attribute("name") else { continue };
+        all.insert((name, name));
+        let shown = unit.children().filter(|e| e.name() == "DisplayUnit");
+        all.extend(shown.filter_map(|e| Some((name, e.attribute("name")?))));
     }
     all
 }
 
 /// Kinds of dependencies that are unknown, or not as many as dependencies.
-fn kinds(root: &Element, version: Version) -> Vec<String> {
+fn dependency_kinds(root: &Element, version: Version) -> Vec<Defect> {
     let Some(structure) = root.child("ModelStructure") else { return Vec::new() };
     let unknowns: Vec<Element> = match version {
         Version::V2 => structure.children().flat_map(|list| list.children().collect::<Vec<_>>()).collect(),
         Version::V3 => structure.children().collect(),
     };
-    let mut all = Vec::new();
-    for unknown in unknowns {
-        let Some(kinds) = unknown.attribute("dependenciesKind") else { continue };
-        let at = format!("line {}: `dependenciesKind`", unknown.line());
-        let count = unknown.attribute("dependencies").map(|d| d.split_whitespace().count());
-        let given = kinds.split_whitespace().count();
-        match (count, kinds.split_whitespace().find(|k| !KINDS.contains(k))) {
-            (_, Some(wrong)) => {
-                all.push(format!("{at} has `{}`, which is none of {}", printable(wrong), KINDS.join(", ")))
-            }
-            (None, None) => all.push(format!("{at} stands without `dependencies`")),
-            (Some(count), None) if count != given => {
-                all.push(format!("{at} has {given} kinds for {count} dependencies"))
-            }
-            _ => {}
-        }
+    let mut lines = LineCounter::of(root);
+    let defect = |unknown: &Element| {
+        let message = wrong_kinds(unknown.attribute("dependencies"), unknown.attribute("dependenciesKind")?)?;
+        let message = format!("`dependenciesKind` {message}");
+        Some(Defect { kind: DefectKind::DependencyKind, line: Some(lines.line(unknown)), message })
+    };
+    unknowns.iter().filter_map(defect).collect()
+}
+
+/// Why kinds do not belong to dependencies.
+fn wrong_kinds(dependencies: Option<&str>, kinds: &str) -> Option<String> {
+    if let Some(wrong) = kinds.split_whitespace().find(|k| !KINDS.contains(k)) {
+        return Some(format!("has `{}`, which is none of {}", printable(wrong), KINDS.join(", ")));
     }
-    all
+    let Some(dependencies) = dependencies else { return Some("stands without `dependencies`".into()) };
+    let [given, count] = [kinds, dependencies].map(|text| text.split_whitespace().count());
+    (given != count).then(|| format!("has {given} kinds for {count} dependencies"))
 }
 
 /// A default experiment that cannot be made.
-fn of_experiment(root: &Element, experiment: &Experiment) -> Vec<String> {
+fn of_experiment(root: &Element, experiment: &Experiment) -> Vec<Defect> {
     let Some(element) = root.child("DefaultExperiment") else { return Vec::new() };
-    let mut all = Vec::new();
     let start = experiment.start.unwrap_or(0.0);
-    if let Some(stop) = experiment.stop.filter(|stop| *stop <= start) {
-        all.push(format!(
-            "line {}: the default experiment ends at {stop} s and begins at {start} s",
-            element.line()
-        ));
-    }
-    for (name, value) in [("tolerance", experiment.tolerance), ("stepSize", experiment.step)] {
-        if let Some(value) = value.filter(|value| !(*value > 0.0)) {
-            all.push(format!(
-                "line {}: the default experiment has {name} = {value}, which is not above 0",
-                element.line()
-            ));
-        }
-    }
-    all
+    let ends = experiment.stop.filter(|stop| *stop <= start);
+    let ends = ends.map(|stop| format!("ends at {stop} s and begins at {start} s"));
+    let not_above = [("tolerance", experiment.tolerance), ("stepSize", experiment.step)];
+    let not_above = not_above.iter().filter_map(|(name, value)| {
+        let value = value.filter(|value| !(*value > 0.0))?;
+        Some(format!("has {name} = {value}, which is not above 0"))
+    });
+    let defect = |message: String| Defect {
+        kind: DefectKind::Experiment,
+        line: Some(element.line()),
+        message: format!("the default experiment {message}"),
+    };
+    ends.into_iter().chain(not_above).map(defect).collect()
 }

@@ -80,6 +80,28 @@ fn tag_end(text: &str) -> Option<usize> {
     None
 }
 
+/// Counts lines in one pass over the file: of elements in their order.
+pub struct LineCounter<'a> {
+    text: &'a str,
+    at: usize,
+    line: u32,
+}
+
+impl<'a> LineCounter<'a> {
+    /// Of the file of an element.
+    pub fn of(element: &Element<'a>) -> Self {
+        Self { text: element.document.input_text(), at: 0, line: 1 }
+    }
+
+    pub fn line(&mut self, element: &Element) -> u32 {
+        let position = element.node.range().start;
+        let between = self.text.as_bytes().get(self.at..position).unwrap_or_default();
+        self.line += between.iter().filter(|b| **b == b'\n').count() as u32;
+        self.at = self.at.max(position);
+        self.line
+    }
+}
+
 /// An element with its file.
 #[derive(Clone, Copy)]
 pub struct Element<'a> {

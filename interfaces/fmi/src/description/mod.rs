@@ -10,7 +10,6 @@ mod terminals;
 pub(crate) mod types;
 mod variables;
 
-pub use defects::{Defect, DefectKind};
 pub use model::*;
 
 use crate::error::{Error, Result};
@@ -79,7 +78,7 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
     };
     variables::read(root, &mut description)?;
     structure::read(root, &mut description)?;
-    description.problems.extend(details::problems(root, version, &description.experiment));
+    description.details = details::defects(root, version, &description.experiment);
     Ok(description)
 }
 

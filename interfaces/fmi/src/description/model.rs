@@ -56,6 +56,8 @@ pub struct ModelDescription {
     pub terminals: Vec<Terminal>,
     /// Harmless deviations from the standard.
     pub problems: Vec<String>,
+    /// Defects of attributes that nothing else here needs.
+    pub(super) details: Vec<Defect>,
 }
 
 impl ModelDescription {
@@ -357,5 +359,48 @@ impl ModelDescription {
             }
         };
         able && v.causality == Causality::Input && v.variability == Variability::Continuous
+    }
+}
+
+/// Kinds of defects; of each, a run warns once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum DefectKind {
+    Enumeration,
+    Range,
+    StartRange,
+    StartCount,
+    StartMissing,
+    StartCalculated,
+    Unit,
+    BaseUnit,
+    Clock,
+    Role,
+    Continuous,
+    Derivative,
+    ClockReference,
+    Structure,
+    DisplayUnit,
+    DependencyKind,
+    Experiment,
+}
+
+/// A defect of a description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Defect {
+    /// Its kind.
+    pub kind: DefectKind,
+    /// Line in `modelDescription.xml`; none where an element is missing.
+    pub line: Option<u32>,
+    /// One sentence with the name of the variable.
+    pub message: String,
+}
+
+impl std::fmt::Display for Defect {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "line {line}: {}", self.message),
+            None => f.write_str(&self.message),
+        }
     }
 }

@@ -45,14 +45,17 @@ pub fn types(root: &Element, version: Version) -> Result<Vec<DeclaredType>> {
     list.children().map(|e| one(&e, version)).filter_map(Result::transpose).collect()
 }
 
-fn one(element: &Element, version: Version) -> Result<Option<DeclaredType>> {
-    let name = element.required("name")?.to_owned();
-    // FMI 2.0 wraps the type, FMI 3.0 is the type.
-    let inner = match version {
+/// The element that is the type of a declaration or a variable: FMI 2.0 wraps it, FMI 3.0 is it.
+pub fn inner<'a>(element: &Element<'a>, version: Version) -> Option<Element<'a>> {
+    match version {
         Version::V2 => element.children().next(),
         Version::V3 => Some(*element),
-    };
-    let Some(inner) = inner else { return Ok(None) };
+    }
+}
+
+fn one(element: &Element, version: Version) -> Result<Option<DeclaredType>> {
+    let name = element.required("name")?.to_owned();
+    let Some(inner) = inner(element, version) else { return Ok(None) };
     let mut items = Vec::new();
     for item in inner.children().filter(|e| e.name() == "Item") {
         let value = item.whole("value", "a whole number")?;

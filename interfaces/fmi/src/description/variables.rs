@@ -1,6 +1,6 @@
 //! The variables of both versions.
 
-use super::element::{Element, number};
+use super::element::{Element, LineCounter, number};
 use super::model::*;
 use super::printable;
 use crate::error::Result;
@@ -14,9 +14,9 @@ pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
     let mut references: BTreeMap<(u32, bool), String> = BTreeMap::new();
     let types: BTreeMap<String, DeclaredType> =
         description.types.iter().map(|t| (t.name.clone(), t.clone())).collect();
-    let mut lines = LineCounter { text: list.document.input_text(), at: 0, line: 1 };
+    let mut lines = LineCounter::of(&list);
     for element in list.children() {
-        let line = lines.line(element.node.range().start);
+        let line = lines.line(&element);
         let variable = match description.version {
             Version::V2 => two(&element, &types, line)?,
             Version::V3 => three(&element, &types, line)?,
@@ -52,22 +52,6 @@ pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
         }
     }
     sizes(root, description)
-}
-
-/// Counts lines in one pass over the file.
-struct LineCounter<'a> {
-    text: &'a str,
-    at: usize,
-    line: u32,
-}
-
-impl LineCounter<'_> {
-    fn line(&mut self, position: usize) -> u32 {
-        let between = self.text.as_bytes().get(self.at..position).unwrap_or_default();
-        self.line += between.iter().filter(|b| **b == b'\n').count() as u32;
-        self.at = self.at.max(position);
-        self.line
-    }
 }
 
 type Types = BTreeMap<String, DeclaredType>;

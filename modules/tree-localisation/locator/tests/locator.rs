@@ -1,7 +1,10 @@
 //! The module: point clouds of scanners, messages that are none, scanners at the wrong place, states that are saved.
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod standing;
+
 use proptest::prelude::*;
+use standing::Standing;
 use std::sync::Arc;
 use terraglue_laser_scanner::{Told, message};
 use terraglue_subsystem::*;
@@ -14,36 +17,10 @@ fn told(position: [f64; 3]) -> Told {
 }
 
 /// A machine of two bodies that stands.
-struct Standing {
-    names: Vec<String>,
-    scene: Scene,
-}
-
-impl World for Standing {
-    fn interval(&self) -> [f64; 2] {
-        [0.0, 1.0]
-    }
-    fn subsystems(&self) -> &[String] {
-        &self.names
-    }
-    fn scene(&self, subsystem: u32) -> Option<&Scene> {
-        (subsystem == 0).then_some(&self.scene)
-    }
-    fn is_visible(&self, _: ShapeRef) -> bool {
-        true
-    }
-    fn pose(&self, _: BodyRef, _: f64) -> Option<BodyState> {
-        Some(BodyState::REST)
-    }
-    fn cast_rays(&self, _: &[Ray], _: &RayMask, _: &mut [RayHit]) {}
-    fn ground_heights(&self, _: &[[f64; 2]], _: &mut [f64]) {}
-    fn overlap(&self, _: [f64; 3], _: f64, _: &RayMask, _: &mut Vec<ShapeRef>) {}
-}
-
 fn world() -> Standing {
     let body = |name: &str| SceneBody { name: name.into(), mass: 1.0 };
     let scene = Scene { bodies: vec![body("front"), body("head")], ..Scene::default() };
-    Standing { names: vec!["machine".into()], scene }
+    Standing::with(scene)
 }
 
 fn locator(json: &str) -> Result<TreeLocator> {

@@ -1,6 +1,9 @@
 //! A machine that leans finds the place that it finds when it stands level: scans of cylinders on a plane, in closed form.
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod standing;
+
+use standing::Standing;
 use std::sync::Arc;
 use terraglue_laser_scanner::{Pattern, Told, message};
 use terraglue_numerics::random::uniform;
@@ -79,32 +82,6 @@ fn scan([roll, pitch]: [f64; 2]) -> Vec<u8> {
 }
 
 /// A machine with a pole.
-struct Standing {
-    names: Vec<String>,
-    scene: Scene,
-}
-
-impl World for Standing {
-    fn interval(&self) -> [f64; 2] {
-        [0.0, 1.0]
-    }
-    fn subsystems(&self) -> &[String] {
-        &self.names
-    }
-    fn scene(&self, subsystem: u32) -> Option<&Scene> {
-        (subsystem == 0).then_some(&self.scene)
-    }
-    fn is_visible(&self, _: ShapeRef) -> bool {
-        true
-    }
-    fn pose(&self, _: BodyRef, _: f64) -> Option<BodyState> {
-        Some(BodyState::REST)
-    }
-    fn cast_rays(&self, _: &[Ray], _: &RayMask, _: &mut [RayHit]) {}
-    fn ground_heights(&self, _: &[[f64; 2]], _: &mut [f64]) {}
-    fn overlap(&self, _: [f64; 3], _: f64, _: &RayMask, _: &mut Vec<ShapeRef>) {}
-}
-
 fn world() -> Standing {
     let body = |name: &str| SceneBody { name: name.into(), mass: 1.0 };
     let pole = SceneShape {
@@ -117,7 +94,7 @@ fn world() -> Standing {
         material: Material::default(),
     };
     let scene = Scene { bodies: vec![body("front")], shapes: vec![pole], ..Scene::default() };
-    Standing { names: vec!["machine".into()], scene }
+    Standing::with(scene)
 }
 
 /// Distance from the true place, m, turn from the true yaw, rad, stems, and of these those that stand where the machine is.

@@ -62,3 +62,75 @@ def test_what_the_standard_allows_is_not_told(tmp_path, version, xml):
     fmu, line = with_variable(tmp_path, version, xml)
     done = terraglue("fmu", "check", fmu)
     assert f"line {line}" not in done.stdout + done.stderr, done.stdout
+
+
+def described(folder, fmu, *replacements):
+    """A copy of an FMU with another description."""
+    copy = folder / "described.fmu"
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(copy, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                for before, after in replacements:
+                    assert before.encode() in data, before
+                    data = data.replace(before.encode(), after.encode(), 1)
+            new.writestr(name, data)
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("version", "before", "after", "message"),
+    [
+        (2, 'causality="input"', 'causalty="input"', "<ScalarVariable> has the attribute `causalty`"),
+        (2, '<Real start="0.0"', '<Real start="0.0" intermediateUpdate="true"', "<Real> has the attribute `intermediateUpdate`"),
+        (2, "<CoSimulation ", '<CoSimulation canGetAndSetFMUState="true" ', "<CoSimulation> has the attribute `canGetAndSetFMUState`"),
+        (3, "<CoSimulation ", '<CoSimulation canGetAndSetFMUstate="true" ', "<CoSimulation> has the attribute `canGetAndSetFMUstate`"),
+        (3, "instantiationToken=", 'guid="g" instantiationToken=', "<fmiModelDescription> has the attribute `guid`"),
+        (3, "<Output ", '<Output dependencyKind="" ', "<Output> has the attribute `dependencyKind`"),
+    ],
+)
+def test_an_attribute_that_the_standard_does_not_know_is_reported(tmp_path, version, before, after, message):
+    plain = build(tmp_path, "m", GAIN, "r[1] = r[0];") if version == 2 else build_3(tmp_path, "m", [("y", "output", None, [])], "v[1][0] = t;")
+    assert "has the attribute" not in terraglue("fmu", "check", plain).stdout
+    fmu = described(tmp_path, plain, (before, after))
+    assert message in terraglue("fmu", "check", fmu).stdout
+    done = terraglue("fmu", "run", fmu, "--strict", "--stop", "0.1")
+    assert done.returncode == 2 and message in done.stderr, done.stderr
+
+
+def test_attributes_and_elements_of_tools_are_their_own(tmp_path):
+    notes = '<VendorAnnotations><Tool name="t" own="1"><other x="2"/></Tool></VendorAnnotations><ModelVariables>'
+    root = '<fmiModelDescription xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="x" '
+    fmu = described(tmp_path, build(tmp_path, "m", GAIN, ""), ("<ModelVariables>", notes), ("<fmiModelDescription ", root))
+    assert "has the attribute" not in terraglue("fmu", "check", fmu).stdout
+
+
+@pytest.mark.parametrize(
+    ("listed", "expected"),
+    [
+        ("", ["`y`, `z` are not listed"]),
+        ('<Unknown index="2"/>', ["`z` is not listed"]),
+        ('<Unknown index="2"/><Unknown index="3"/>', []),
+        ('<Unknown index="1"/><Unknown index="2"/><Unknown index="3"/>', ["`u` does not belong there"]),
+    ],
+)
+def test_the_initial_unknowns_are_those_of_the_standard(tmp_path, listed, expected):
+    fmu = build(tmp_path, "m", [*GAIN, ("z", "output", 0.0, "")], "")
+    fmu = described(tmp_path, fmu, ("</Outputs>", f"</Outputs><InitialUnknowns>{listed}</InitialUnknowns>"))
+    done = terraglue("fmu", "check", fmu)
+    found = [line for line in done.stdout.splitlines() if "initial unknowns" in line]
+    assert len(found) == len(expected) and all(words in line for words, line in zip(expected, found)), done.stdout
+    assert (done.returncode == 0) == (not expected)
+    # a run does not need them
+    done = terraglue("fmu", "run", fmu, "--strict", "--stop", "0.1")
+    assert done.returncode == 0 and "initial unknowns" not in done.stderr, done.stderr
+
+
+def test_exact_outputs_are_no_initial_unknowns_and_states_are(tmp_path):
+    fmu = build(tmp_path, "m", GAIN, "", others='<ScalarVariable name="v" valueReference="7"><Real derivative="4"/></ScalarVariable>'
+                '<ScalarVariable name="x" valueReference="8" initial="exact"><Real start="1"/></ScalarVariable>')
+    lists = '</Outputs><Derivatives><Unknown index="3"/></Derivatives><InitialUnknowns>%s</InitialUnknowns>'
+    exact = ('causality="output"', 'causality="output" initial="exact"'), ("<Real/>", '<Real start="0"/>')
+    for listed, words in [('<Unknown index="3"/>', None), ("", "`v` is not listed"), ('<Unknown index="3"/><Unknown index="4"/>', "`x` does not belong")]:
+        done = terraglue("fmu", "check", described(tmp_path, fmu, *exact, ("</Outputs>", lists % listed)))
+        assert ("initial unknowns" in done.stdout) == bool(words) and (words or "") in done.stdout, done.stdout

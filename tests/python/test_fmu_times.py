@@ -3,7 +3,7 @@
 import csv
 
 import pytest
-from cfmu import build
+from cfmu import build, build_3
 from conftest import terraglue
 
 INTEGRAL = [("u", "input", 0.0, ""), ("x", "output", 0.0, "")]
@@ -88,7 +88,7 @@ def test_an_exported_scenario_runs_where_nothing_can_be_isolated(folder):
     assert done.returncode == 0 and "`isolate` is left out" in done.stderr, done.stderr
     fmpy = pytest.importorskip("fmpy")
     result = fmpy.simulate_fmu(str(folder / "e.fmu"), stop_time=0.2, step_size=0.1, output=["late.y"])
-    assert list(result["late.y"])[1:] == [7.0] * 2
+    assert list(result["late.y"]) == [7.0] * 3
 
 
 def test_a_trace_begins_with_the_instance_and_ends_with_its_end(folder):
@@ -115,3 +115,31 @@ def test_attributes_for_other_tools_are_checked(tmp_path):
     fmu = build(tmp_path, "wrong", SHOWN[:1], "", others=other % "ft", units=units)
     done = terraglue("fmu", "check", fmu)
     assert "line" in done.stdout + done.stderr and "display unit `ft`" in done.stdout + done.stderr
+
+
+def test_a_run_beyond_the_end_that_an_fmu_was_given_is_warned_of_once(folder):
+    for stop, warns in [("0.5", False), ("0.4", True), ("0.4999999999999", False)]:
+        _, errors = scenario(folder, {"late": f"stop_time_s = {stop}"}, 0.1, 0.5)
+        assert errors.count("beyond stop_time_s") == int(warns), errors
+
+
+def test_elements_of_an_array_are_start_values_as_in_a_scenario(tmp_path):
+    own = "v[2][0] = 0; for (int k = 0; k < 6; k++) v[2][0] += (k + 1) * v[1][k];"
+    build_3(tmp_path, "sum", [("u", "input", "1 2 3 4 5 6", [2, 3]), ("y", "output", None, [])], own)
+    expected = 1 + 2 * 2 + 3 * 10 + 4 * 20 + 5 * 5 + 6 * 6
+    rows, _ = alone(tmp_path, "sum", "--start", "u[1,3]=10", "--start", "u[2,1]=20", "--stop", "0.1", "--step", "0.1")
+    assert float(rows[-1]["y"]) == expected
+    rows, _ = scenario(tmp_path, {"sum": '"u[1,3]" = 10.0\n"u[2,1]" = 20.0'}, 0.1, 0.1)
+    assert float(rows[-1]["sum.y"]) == expected
+    for wrong, words in [(["u[3,1]=1"], "u[3,1]"), (["u[1,1]=x"], "takes a number"), (["u=1 1 1 1 1 1", "u[1,1]=2"], "whole and by element")]:
+        starts = [word for text in wrong for word in ("--start", text)]
+        done = terraglue("fmu", "run", "sum.fmu", *starts, "--stop", "0.1", cwd=tmp_path)
+        assert done.returncode == 2 and words in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("isolate", [[], ["--isolate"]])
+def test_what_an_fmu_prints_does_not_get_into_the_table(tmp_path, isolate):
+    build(tmp_path, "loud", SHOWN[:1], 'printf("17,18,19\\n"); fflush(0); r[0] = t;', more="#include <stdio.h>")
+    done = terraglue("fmu", "run", "loud.fmu", "--stop", "0.2", "--step", "0.1", *isolate, cwd=tmp_path)
+    assert done.returncode == 0 and done.stdout.splitlines()[0] == "time,y" and len(done.stdout.splitlines()) == 4, done.stdout
+    assert "17,18,19" in done.stderr

@@ -125,7 +125,7 @@ fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
 /// Sends rows on to standard output; sets `unread` when nobody reads them any more, as after `head`.
 fn send_rows(mut from: PipeReader, unread: Arc<AtomicBool>) -> JoinHandle<()> {
     std::thread::spawn(move || {
-        let mut out = std::io::stdout().lock();
+        let mut out = super::output::own();
         let sent = std::io::copy(&mut from, &mut out).and_then(|_| out.flush());
         unread.store(sent.is_err(), Ordering::Relaxed);
     })

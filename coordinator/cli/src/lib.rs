@@ -90,6 +90,7 @@ pub fn main() -> ExitCode {
         return terraglue_host::isolation::serve(segment, &terraglue_fmu::library());
     }
     logger::install();
+    output::keep_apart_from_modules();
     descendants::adopt();
     // what the checker makes of modules that end the program is its own affair
     let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });

@@ -3,6 +3,7 @@
 mod elements;
 mod opening;
 
+use super::array_starts::ArrayStarts;
 use super::bodies::{Axis, Bodies, terminals};
 use super::clocks;
 use super::map::{self, ValueLocation};
@@ -10,10 +11,9 @@ use super::rollback;
 use super::settings::{OnNan, options, structure};
 use serde_json::{Map, Value};
 use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use terraglue_fmi::description::{ModelDescription, Start};
+use terraglue_fmi::description::ModelDescription;
 use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, FmuState, Stepped};
 use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
@@ -53,10 +53,12 @@ pub struct FmuSubsystem {
     references: RefCell<Vec<u32>>,
     bodies: Bodies,
     /// Arrays by reference that are being set element by element before the initialisation.
-    starts: BTreeMap<u32, Vec<Option<f64>>>,
+    starts: ArrayStarts,
     feeds_through: bool,
     /// Time of the FMU at t = 0, s.
     start_time_s: f64,
+    /// The end that the FMU was given, in its own time, s; ∞: none, or a step beyond it was warned of.
+    stop_time_s: f64,
     teardown_errors: TeardownErrors,
 }
 
@@ -99,16 +101,17 @@ impl FmuSubsystem {
             warned: Cell::new(false),
             references: RefCell::default(),
             bodies: Bodies::default(),
-            starts: BTreeMap::new(),
+            starts: ArrayStarts::default(),
             feeds_through: feeds_through(&description, &description.initial_unknowns),
             start_time_s: options.start_time_s,
+            stop_time_s: options.stop_time_s.unwrap_or(f64::INFINITY),
             teardown_errors: TeardownErrors::default(),
             host,
         };
         for (name, value) in start {
             subsystem.set_start(&name, &value)?;
         }
-        subsystem.start_arrays()?;
+        std::mem::take(&mut subsystem.starts).set(&subsystem.instance).map_err(error)?;
         subsystem.bodies = bodies(&subsystem, &options.bodies, &description)?;
         subsystem.has_bodies = !subsystem.bodies.is_empty();
         if subsystem.has_bodies && !subsystem.can_go_back {
@@ -184,34 +187,7 @@ impl FmuSubsystem {
     /// Keeps an element of an array until all are known: nothing can be read yet.
     fn start_element(&mut self, id: u32, value: f64) -> Result {
         let place = *self.place(id)?;
-        let whole = self.starts.entry(place.reference).or_insert_with(|| vec![None; place.count as usize]);
-        whole[place.element as usize] = Some(value);
-        Ok(())
-    }
-
-    /// Sets arrays of which elements were given; the others have the start values of the description.
-    fn start_arrays(&mut self) -> Result {
-        let description = self.instance.description().clone();
-        for (reference, given) in std::mem::take(&mut self.starts) {
-            let found = description.variables.iter().find(|v| v.reference == reference && !v.alias);
-            let Some(v) = found else { continue };
-            if let Some(k) = given.iter().position(Option::is_none).filter(|_| v.resized) {
-                return Err(Error::Refused(format!(
-                    "`{}` lacks a value: structural parameters changed the shape of `{}` and with it the start values \
-                     of the FMU, so give all {} or none",
-                    map::element_name(v, k),
-                    v.name,
-                    given.len()
-                )));
-            }
-            let own = match &v.start {
-                Start::Numbers(own) => own.as_slice(),
-                _ => &[],
-            };
-            let known = |k: usize| own.get(k).or(own.first()).copied().unwrap_or(0.0);
-            let whole: Vec<f64> = given.iter().enumerate().map(|(k, x)| x.unwrap_or(known(k))).collect();
-            self.instance.set_f64(&[reference], &whole).map_err(error)?;
-        }
+        self.starts.give(place.reference, (place.element as usize, place.count as usize), value);
         Ok(())
     }
 
@@ -457,6 +433,9 @@ impl Subsystem for FmuSubsystem {
         }
         self.open = true;
         let t = self.start_time_s + step.t;
+        if t + 0.5 * step.h > self.stop_time_s {
+            opening::warn_of_end(std::mem::replace(&mut self.stop_time_s, f64::INFINITY), &*self.host);
+        }
         match self.instance.do_step(Advance { t, h: step.h, for_good: !self.kept.get() }) {
             Ok(Stepped { terminate: false, .. }) => {}
             other => return Err(self.stopped(step, other)),

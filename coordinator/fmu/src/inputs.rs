@@ -134,8 +134,11 @@ impl Inputs {
 /// Advice where an FMU fails that follows its inputs.
 const WAY_OUT: &str = "it follows its inputs within steps; --hold-inputs holds them over each step instead";
 
-/// The variable that a column feeds, and the element of it.
-fn place<'a>(description: &'a ModelDescription, name: &str) -> Result<(&'a Variable, Option<usize>)> {
+/// The variable of a column or a start value, and the element of it: elements of arrays of Float64 have names of their own.
+///
+/// # Errors
+/// [`Error::WrongInput`]: there is no variable of this name.
+pub fn place<'a>(description: &'a ModelDescription, name: &str) -> Result<(&'a Variable, Option<usize>)> {
     let array = |v: &&Variable| {
         v.value_type == ValueType::F64
             && name.strip_prefix(v.name.as_str()).is_some_and(|r| r.starts_with('['))

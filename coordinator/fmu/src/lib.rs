@@ -9,6 +9,7 @@
 struct Readme;
 
 mod adapter;
+mod array_starts;
 mod bodies;
 mod clocks;
 mod driven_bodies;

@@ -1,5 +1,6 @@
 //! One FMU alone: from its start to its end in equal steps, its outputs as rows of a table.
 
+use super::array_starts::ArrayStarts;
 use super::inputs::{self, Inputs, set_text};
 use super::map::{element_name, find};
 use super::settings::OnNan;
@@ -80,7 +81,13 @@ pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
     if between {
         shown_between(description, &settings.outputs)?;
     }
-    settings.start.iter().try_for_each(|(name, _)| find(description, name).map(drop))
+    // elements are looked for where structural parameters have given arrays their sizes
+    let of_array = |name: &str| {
+        let owner = name.split_once('[').map_or(name, |(owner, _)| owner);
+        description.variables.iter().any(|v| v.name == owner && !v.dimensions.is_empty())
+    };
+    let mut others = settings.start.iter().filter(|(name, _)| !of_array(name));
+    others.try_for_each(|(name, _)| find(description, name).map(drop))
 }
 
 /// Runs an FMU and writes its tables. Answers when the FMU itself asked for the end of the run before its time, s.
@@ -222,12 +229,25 @@ fn plan(fmu: &Fmu, settings: &Settings) -> Result<Plan> {
 /// Start values and the initialisation from a start to a stop; the inputs over time, which are set.
 fn initialize(instance: &mut FmuInstance, settings: &Settings, (start, stop): (f64, f64)) -> Result<Inputs> {
     let description = instance.description().clone();
+    let mut elements = ArrayStarts::default();
     for (name, text) in &settings.start {
-        let v = find(&description, name)?;
-        if v.causality != Causality::StructuralParameter {
-            set_text(instance.foreign(), v, text)?;
+        let (v, element) = inputs::place(&description, name)?;
+        match element {
+            Some(_) if settings.start.iter().any(|(other, _)| *other == v.name) => {
+                let message = format!("`{}` is given whole and by element: `{name}`", v.name);
+                return Err(Error::WrongInput(message));
+            }
+            Some(k) => {
+                let wrong = || Error::WrongInput(format!("`{name}` = {text}: it takes a number"));
+                elements.give(v.reference, (k, v.len()), text.trim().parse().map_err(|_| wrong())?);
+            }
+            None if v.causality != Causality::StructuralParameter => {
+                set_text(instance.foreign(), v, text)?;
+            }
+            None => {}
         }
     }
+    elements.set(instance)?;
     let tolerance = settings.tolerance.or(description.experiment.tolerance);
     instance.enter_initialization(start, Some(stop), tolerance)?;
     let inputs = Inputs::find(instance, &settings.input, settings.hold_inputs)?;
@@ -315,7 +335,8 @@ fn named(error: Error, t: f64) -> Error {
 fn configure(instance: &mut FmuInstance, start: &[(String, String)]) -> Result {
     let mut values: Vec<(&str, i128)> = Vec::new();
     for (name, text) in start {
-        if find(instance.description(), name)?.causality != Causality::StructuralParameter {
+        let structural = |v: &Variable| v.name == *name && v.causality == Causality::StructuralParameter;
+        if !instance.description().variables.iter().any(structural) {
             continue;
         }
         let wrong =

@@ -4,7 +4,7 @@
 //! an iterative strategy costs one `advance_again`.
 #![allow(missing_docs)]
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/suite/common/mod.rs"]
 mod common;
 
 use common::Fixture;

@@ -54,6 +54,16 @@ pub(super) fn warn_of_start(
     }
 }
 
+/// Warns of a step that goes beyond the end that the FMU was given: the standards forbid it, and the FMU may answer with anything.
+#[cold]
+pub(super) fn warn_of_end(stop_time_s: f64, host: &dyn Host) {
+    let text = format!(
+        "the run goes on beyond stop_time_s = {stop_time_s}, the end that the FMU was given (times of the FMU, s): make stop_time_s larger, or \
+         leave it out"
+    );
+    host.log(LogLevel::Warning, &text);
+}
+
 /// Says where steps of one length only are not those that the description names.
 #[cold]
 pub(super) fn warn_of_length(description: &ModelDescription, h: f64, host: &dyn Host) {

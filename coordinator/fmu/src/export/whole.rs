@@ -158,12 +158,13 @@ impl Subsystem for Whole {
         self.capabilities
     }
 
-    /// A step of h = 0 ends the time in which poses are set without a way to them.
+    /// A step of h = 0 ends the initialisation: that of the FMUs within, and the time in which poses are set without a way to them.
     fn advance(&mut self, step: &Step, _: &Input, out: &mut Response) -> Result {
         if step.h == 0.0 {
             for slot in &self.feet {
                 tell(&mut self.testbed, *slot, driven_bodies::id::JUMP, Values::Bool(&[false]))?;
             }
+            self.testbed.end_initialization().map_err(failed)?;
         } else {
             self.go(step.h)?;
         }

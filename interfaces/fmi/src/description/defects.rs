@@ -31,10 +31,11 @@ impl ModelDescription {
         all(self)
     }
 
-    /// Warnings of a run: [`ModelDescription::problems`], and one for each kind of defect.
+    /// Warnings of a run: [`ModelDescription::problems`], and one for each kind of defect that concerns it.
     pub fn warnings(&self) -> Vec<String> {
         let mut all = self.problems.clone();
-        all.extend(grouped(&self.defects()));
+        let defects = self.defects().into_iter().filter(|d| d.kind.concerns_a_run());
+        all.extend(grouped(&defects.collect::<Vec<_>>()));
         all
     }
 }

@@ -1,8 +1,10 @@
 //! The model description of an FMU: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
+mod attributes;
 mod defects;
 mod details;
 pub(crate) mod element;
+mod initial_unknowns;
 mod model;
 mod resize;
 mod structure;
@@ -78,7 +80,9 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
     };
     variables::read(root, &mut description)?;
     structure::read(root, &mut description)?;
-    description.details = details::defects(root, version, &description.experiment);
+    description.details = attributes::defects(root, version);
+    description.details.extend(details::defects(root, version, &description.experiment));
+    description.details.extend(initial_unknowns::defects(root, &description));
     Ok(description)
 }
 

@@ -383,6 +383,15 @@ pub enum DefectKind {
     DisplayUnit,
     DependencyKind,
     Experiment,
+    Attribute,
+    InitialUnknowns,
+}
+
+impl DefectKind {
+    /// Whether a run warns of it and `strict` refuses it. Co-simulation needs no list of initial unknowns, and many tools write none.
+    pub fn concerns_a_run(self) -> bool {
+        self != Self::InitialUnknowns
+    }
 }
 
 /// A defect of a description.

@@ -11,11 +11,7 @@ pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
         description.problems.push("there is no <ModelStructure>".into());
         return Ok(());
     };
-    let mut by_reference = BTreeMap::new();
-    for (k, v) in description.variables.iter().enumerate().filter(|(_, v)| !v.alias) {
-        by_reference.entry(v.reference).or_insert(k);
-    }
-    let lookup = Lookup { version: description.version, by_reference, count: description.variables.len() };
+    let lookup = Lookup::of(description);
     let (outputs, initial) = match description.version {
         Version::V2 => (lookup.below(&structure, "Outputs")?, lookup.below(&structure, "InitialUnknowns")?),
         Version::V3 => (lookup.named(&structure, "Output")?, lookup.named(&structure, "InitialUnknown")?),
@@ -24,13 +20,36 @@ pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
     Ok(())
 }
 
-struct Lookup {
+/// Positions of variables by the number that elements of the structure have for them.
+pub struct Lookup {
     version: Version,
     by_reference: BTreeMap<u32, usize>,
     count: usize,
 }
 
 impl Lookup {
+    /// Of the variables of a description.
+    pub fn of(description: &ModelDescription) -> Self {
+        let mut by_reference = BTreeMap::new();
+        for (k, v) in description.variables.iter().enumerate().filter(|(_, v)| !v.alias) {
+            by_reference.entry(v.reference).or_insert(k);
+        }
+        Self { version: description.version, by_reference, count: description.variables.len() }
+    }
+
+    /// The attribute that holds the number.
+    pub fn key(&self) -> &'static str {
+        if self.version == Version::V2 { "index" } else { "valueReference" }
+    }
+
+    /// The position of the variable with this number: its place from 1 in FMI 2, its number in calls in FMI 3.
+    pub fn find(&self, number: u32) -> Option<usize> {
+        match self.version {
+            Version::V2 => (number as usize).checked_sub(1).filter(|k| *k < self.count),
+            Version::V3 => self.by_reference.get(&number).copied(),
+        }
+    }
+
     fn below(&self, structure: &Element, list: &str) -> Result<Vec<Unknown>> {
         let children = structure.child(list).into_iter().flat_map(|e| e.children().collect::<Vec<_>>());
         children.filter(|e| e.name() == "Unknown").map(|e| self.unknown(&e)).collect()
@@ -41,8 +60,7 @@ impl Lookup {
     }
 
     fn unknown(&self, element: &Element) -> Result<Unknown> {
-        let key = if self.version == Version::V2 { "index" } else { "valueReference" };
-        let variable = self.position(element, element.reference(key)?)?;
+        let variable = self.position(element, element.reference(self.key())?)?;
         let dependencies = match element.attribute("dependencies") {
             None => None,
             Some(text) => {
@@ -58,10 +76,6 @@ impl Lookup {
     }
 
     fn position(&self, element: &Element, number: u32) -> Result<usize> {
-        let found = match self.version {
-            Version::V2 => (number as usize).checked_sub(1).filter(|k| *k < self.count),
-            Version::V3 => self.by_reference.get(&number).copied(),
-        };
-        found.ok_or_else(|| element.error(format!("no variable has the number {number}")))
+        self.find(number).ok_or_else(|| element.error(format!("no variable has the number {number}")))
     }
 }

@@ -3,7 +3,7 @@
 //! `cargo bench -p terraglue-soil-cellular-automaton --bench feet`; `cargo xtask validate soil` splits it into steps.
 #![allow(missing_docs)]
 
-#[path = "../tests/feet/mod.rs"]
+#[path = "../tests/suite/feet/mod.rs"]
 mod feet;
 #[path = "../../contact/tests/support/mod.rs"]
 #[allow(unused_imports)]

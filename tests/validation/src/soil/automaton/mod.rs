@@ -2,7 +2,7 @@
 
 mod cone;
 mod cost;
-#[path = "../../../../../modules/soil/cellular-automaton/tests/feet/mod.rs"]
+#[path = "../../../../../modules/soil/cellular-automaton/tests/suite/feet/mod.rs"]
 mod feet;
 mod field;
 mod footprint;

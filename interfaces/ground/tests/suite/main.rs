@@ -1,0 +1,7 @@
+//! The integration tests of this crate in one program: it is linked once.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+mod footprint;
+mod height_field;
+mod joined;
+mod lower_surface;

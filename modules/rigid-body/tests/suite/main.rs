@@ -1,0 +1,30 @@
+//! The integration tests of this crate in one program: it is linked once.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+mod actuators;
+mod closed_joints;
+mod common;
+mod contact;
+mod contact_arm;
+mod contact_energy;
+mod explicit;
+mod faults;
+mod ground;
+mod initial;
+mod joint_jacobian;
+mod loads;
+mod loops;
+mod mjcf;
+mod motion;
+mod objects;
+mod painleve;
+mod patches;
+mod port_arm;
+mod pyramid;
+mod reactions;
+mod rover;
+mod scene_joints;
+mod second_order;
+mod shapes;
+mod singular;
+mod told;

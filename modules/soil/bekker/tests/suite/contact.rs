@@ -1,0 +1,6 @@
+//! Properties of every soil: rest, plates, stick, shear, derivatives, states, energy.
+
+use crate::bars;
+use crate::support;
+
+bars::contact_tests!(terraglue_soil_bekker::SoilBekker, true);

@@ -7,6 +7,7 @@
 use super::Exit;
 use super::arguments::FmuRunArguments;
 use super::interrupt::Interrupt;
+use super::standard_output;
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::fs::File;
 use std::io::{PipeReader, PipeWriter, Read, Write};
@@ -125,7 +126,7 @@ fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
 /// Sends rows on to standard output; sets `unread` when nobody reads them any more, as after `head`.
 fn send_rows(mut from: PipeReader, unread: Arc<AtomicBool>) -> JoinHandle<()> {
     std::thread::spawn(move || {
-        let mut out = super::output::own();
+        let mut out = standard_output::own();
         let sent = std::io::copy(&mut from, &mut out).and_then(|_| out.flush());
         unread.store(sent.is_err(), Ordering::Relaxed);
     })

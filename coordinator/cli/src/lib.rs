@@ -37,6 +37,7 @@ mod shot_arguments;
 mod show;
 mod soil_module;
 mod soils;
+mod standard_output;
 mod strict;
 mod structure;
 mod sweep;
@@ -90,7 +91,7 @@ pub fn main() -> ExitCode {
         return terraglue_host::isolation::serve(segment, &terraglue_fmu::library());
     }
     logger::install();
-    output::keep_apart_from_modules();
+    standard_output::keep_apart_from_modules();
     descendants::adopt();
     // what the checker makes of modules that end the program is its own affair
     let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });

@@ -92,7 +92,7 @@ fn oscillator(gluing: &str, glue: &str) -> String {
 }
 
 #[test]
-fn no_step_allocates_once_the_ports_are_known() {
+fn no_strategy_allocates_once_the_ports_are_known() {
     let spring = "compliance_m_n = 0.006";
     for (gluing, glue) in [
         ("strategy = \"iterative\"", spring),
@@ -118,26 +118,49 @@ fn no_step_allocates_once_the_ports_are_known() {
         let guilty = guilty(&mut testbed, 0.2, 1.0);
         assert!(guilty.is_empty(), "{gluing}: steps that allocate: {guilty:?}");
     }
+}
+
+#[test]
+fn no_step_allocates_on_rigid_ground() {
     for ground in ["half-space", "terrain"] {
         let mut testbed = linked(&on_rigid_ground(ground));
         let guilty = guilty(&mut testbed, 1.0, 2.5);
         assert!(guilty.is_empty(), "{ground}: steps that allocate: {guilty:?}");
     }
+}
+
+#[test]
+fn no_generic_strategy_allocates_on_soil() {
     for strategy in ["xt-newton", "relaxed", "jacobi", "gauss-seidel", "monolithic"] {
         let sets = [("gluing.strategy", strategy), ("time.duration_s", "1.0")];
         let mut testbed = walk(&sets);
         let guilty = guilty(&mut testbed, 0.7, 1.0);
         assert!(guilty.is_empty(), "{strategy}: steps that allocate: {guilty:?}");
     }
-    let guilty_on_grousers = guilty(&mut grousers(), 0.7, 1.0);
-    assert!(guilty_on_grousers.is_empty(), "grousers: steps that allocate: {guilty_on_grousers:?}");
-    for soil in ["soil-cellular-automaton", "soil-bekker"] {
-        for strategy in ["cooperative", "cooperative-compliant", "iterative"] {
-            let mut testbed = walk(&[("soil.module", soil), ("gluing.strategy", strategy)]);
-            let guilty = guilty(&mut testbed, 1.0, 2.5);
-            assert!(guilty.is_empty(), "{soil}, {strategy}: steps that allocate: {guilty:?}");
-        }
+}
+
+#[test]
+fn no_step_allocates_on_grousers() {
+    let guilty = guilty(&mut grousers(), 0.7, 1.0);
+    assert!(guilty.is_empty(), "steps that allocate: {guilty:?}");
+}
+
+fn walk_on(soil: &str) {
+    for strategy in ["cooperative", "cooperative-compliant", "iterative"] {
+        let mut testbed = walk(&[("soil.module", soil), ("gluing.strategy", strategy)]);
+        let guilty = guilty(&mut testbed, 1.0, 2.5);
+        assert!(guilty.is_empty(), "{soil}, {strategy}: steps that allocate: {guilty:?}");
     }
+}
+
+#[test]
+fn no_step_allocates_on_the_automaton() {
+    walk_on("soil-cellular-automaton");
+}
+
+#[test]
+fn no_step_allocates_on_bekker() {
+    walk_on("soil-bekker");
 }
 
 /// A wheel with grousers that creeps on soil.

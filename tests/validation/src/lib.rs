@@ -153,10 +153,9 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     let part = arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone());
     let table = arguments.table.clone();
     let context = Context { quick: arguments.quick, table, part, ..Context::new(profile) };
-    let mut complaints = Vec::new();
-    let measured = areas()
-        .map(|(area, parts)| Ok((*area, judged(area, parts, arguments, &context, &mut complaints)?)))
-        .collect::<Outcome<Vec<_>>>()?;
+    let mut verdicts = Verdicts::of(arguments, &context)?;
+    measure(areas().copied(), &context, |area, figures| verdicts.show(area, figures))?;
+    let (measured, complaints) = verdicts.finish(areas().map(|(area, _)| *area))?;
     if context.part.is_none() {
         documents::write_table(&measured)?;
     }
@@ -166,53 +165,95 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
 }
 
-/// Measures and prints the figures of an area; writes or checks their stored values. `complaints` collects their faults.
-fn judged(
-    area: &str,
-    parts: &[Part],
-    arguments: &Arguments,
-    context: &Context,
-    complaints: &mut Vec<String>,
-) -> Outcome<Vec<Figure>> {
-    let (known, stored) = (KnownFailures::read()?, StoredFigures::read()?);
-    let writes = arguments.write_docs && context.table.is_none() && context.part.is_none();
-    let compares = arguments.is_quick_form() && !writes;
-    let figures = measured(area, parts, context, |figure| {
-        let judged =
-            if figure.timed && !arguments.timing { figure.clone().unjudged() } else { figure.clone() };
-        println!("{}", judged.line());
-        complaints.extend(known.judge(&judged));
-        complaints.extend(compares.then(|| stored.judge(&judged)).flatten());
-    })?;
-    if writes {
-        documents::write_peers(&figures)?;
-    }
-    if arguments.check_docs && context.table.is_none() {
-        complaints.extend(stored.differences(area, &figures));
-    }
-    if writes && arguments.is_quick_form() {
-        stored.write_area(area, &figures)?;
-    }
-    Ok(figures)
+/// Figures that were measured, and what is wrong with them.
+struct Verdicts<'a> {
+    arguments: &'a Arguments,
+    context: &'a Context,
+    known: KnownFailures,
+    stored: StoredFigures,
+    figures: Vec<(&'static str, Vec<Figure>)>,
+    complaints: Vec<String>,
 }
 
-/// The figures of the requested parts of an area; each is shown as soon as it is there.
-fn measured(
-    area: &str,
-    parts: &[Part],
-    context: &Context,
-    mut show: impl FnMut(&Figure),
-) -> Outcome<Vec<Figure>> {
-    let mut figures = Vec::new();
-    for (part, measure) in chosen(parts, context.part.as_deref())? {
-        if std::io::stderr().is_terminal() {
-            eprintln!("measuring {area}: {part}");
-        }
-        let of_part = measure(context)?;
-        of_part.iter().for_each(&mut show);
-        figures.extend(of_part);
+impl<'a> Verdicts<'a> {
+    fn of(arguments: &'a Arguments, context: &'a Context) -> Outcome<Self> {
+        let (known, stored) = (KnownFailures::read()?, StoredFigures::read()?);
+        Ok(Self { arguments, context, known, stored, figures: Vec::new(), complaints: Vec::new() })
     }
-    Ok(figures)
+
+    /// Whether the pages of docs/ and the stored figures are written.
+    fn writes(&self) -> bool {
+        self.arguments.write_docs && self.context.table.is_none() && self.context.part.is_none()
+    }
+
+    /// Prints figures of an area and judges them.
+    fn show(&mut self, area: &'static str, figures: Vec<Figure>) {
+        let compares = self.arguments.is_quick_form() && !self.writes();
+        for figure in &figures {
+            let unjudged = figure.timed && !self.arguments.timing;
+            let judged = if unjudged { figure.clone().unjudged() } else { figure.clone() };
+            println!("{}", judged.line());
+            self.complaints.extend(self.known.judge(&judged));
+            self.complaints.extend(compares.then(|| self.stored.judge(&judged)).flatten());
+        }
+        match self.figures.iter_mut().find(|(name, _)| *name == area) {
+            Some((_, all)) => all.extend(figures),
+            None => self.figures.push((area, figures)),
+        }
+    }
+
+    /// Writes or checks the stored figures of the areas. Returns all figures in the order of the areas, and the complaints.
+    fn finish(
+        mut self,
+        areas: impl Iterator<Item = &'static str>,
+    ) -> Outcome<(Vec<(&'static str, Vec<Figure>)>, Vec<String>)> {
+        let order: Vec<&str> = areas.collect();
+        self.figures.sort_by_key(|(area, _)| order.iter().position(|name| name == area));
+        for (area, figures) in &self.figures {
+            if self.writes() {
+                documents::write_peers(figures)?;
+                if self.arguments.is_quick_form() {
+                    self.stored.write_area(area, figures)?;
+                }
+            }
+            if self.arguments.check_docs && self.context.table.is_none() {
+                self.complaints.extend(self.stored.differences(area, figures));
+            }
+        }
+        Ok((self.figures, self.complaints))
+    }
+}
+
+/// Areas whose programs have limits on their time, or draw in a browser: nothing is measured beside them.
+const ALONE: [&str; 3] = ["fmi", "plugins", "page"];
+
+/// The figures of the requested parts of areas; each part is shown when it and those before it are measured. Parts are measured side by
+/// side where no clock is read, apart from those of [`ALONE`], which come last.
+fn measure(
+    areas: impl Iterator<Item = (&'static str, &'static [Part])>,
+    context: &Context,
+    mut show: impl FnMut(&'static str, Vec<Figure>),
+) -> Outcome {
+    let (mut beside, mut alone) = (Vec::new(), Vec::new());
+    for (area, parts) in areas {
+        let group = if context.timing || ALONE.contains(&area) { &mut alone } else { &mut beside };
+        group.extend(chosen(parts, context.part.as_deref())?.iter().map(|part| (area, *part)));
+    }
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut failures = Vec::new();
+    for (threads, jobs) in [(processors, beside), (1, alone)] {
+        let job = |(area, (part, measure)): &(&str, Part)| {
+            if std::io::stderr().is_terminal() {
+                eprintln!("measuring {area}: {part}");
+            }
+            measure(context)
+        };
+        parallel::in_order(threads, &jobs, job, |(area, (part, _)), figures| match figures {
+            Ok(figures) => show(area, figures),
+            Err(why) => failures.push(format!("{area}: {part}: {why}")),
+        });
+    }
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n       ")) }
 }
 
 /// Prints the bits of all figures of `--quick`, one `id<TAB>bits` a line, with the program of the development profile,
@@ -222,13 +263,12 @@ fn measured(
 /// A measurement that cannot be made.
 pub fn print_bits() -> Outcome {
     let context = Context { quick: true, ..Context::new("debug") };
-    for (area, parts) in AREAS {
-        for figure in measured(area, parts, &context, |_| ())? {
+    measure(AREAS.into_iter(), &context, |_, figures| {
+        for figure in figures {
             let bits = figure.value.map_or("-".to_owned(), |x| format!("{:016x}", x.to_bits()));
             println!("{}\t{bits}", figure.id);
         }
-    }
-    Ok(())
+    })
 }
 
 /// Draws the pictures of docs/images that are computed.

@@ -84,7 +84,7 @@ impl StoredFigures {
     }
 
     /// Writes the figures of an area in place of those that were stored of it.
-    pub fn write_area(mut self, area: &str, figures: &[Figure]) -> Outcome {
+    pub fn write_area(&mut self, area: &str, figures: &[Figure]) -> Outcome {
         self.0.retain(|id, _| !is_of(area, id));
         self.0.extend(figures.iter().map(|f| (f.id.clone(), StoredFigure::of(f))));
         let line = |(id, f): (&String, &StoredFigure)| {

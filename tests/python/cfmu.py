@@ -161,3 +161,17 @@ def build_3(folder, name, variables, step, start="", more="", flags="", n=0, mac
         archive.writestr("modelDescription.xml", description)
         archive.write(folder / f"{name}.so", "binaries/x86_64-linux/m.so")
     return folder / f"{name}.fmu"
+
+
+def described(folder, fmu, *replacements):
+    """A copy of an FMU with another description."""
+    copy = folder / "described.fmu"
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(copy, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                for before, after in replacements:
+                    assert before.encode() in data, before
+                    data = data.replace(before.encode(), after.encode(), 1)
+            new.writestr(name, data)
+    return copy

@@ -5,10 +5,12 @@ import io
 import zipfile
 
 import pytest
-from cfmu import build, build_3
+from cfmu import build, build_3, described
 from conftest import terraglue
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+# of three outputs, of which the last is not among the numbers
+UNKNOWNS = b'<Output valueReference="3"/>' + b"".join(b'<InitialUnknown valueReference="%d"/>' % k for k in (1, 2, 3)) + b"</ModelStructure>"
 DECAY = [("u", "input", 0.0, ""), ("x", "output", 1.0, "")]
 
 
@@ -31,7 +33,8 @@ def bring(fmu, results, inputs=None, source="out.csv"):
 @pytest.fixture
 def fmu(tmp_path):
     """x follows u to the end of each step."""
-    return build(tmp_path, "follows", DECAY, "r[1] = 1.0 + r[0];", flags="")
+    plain = build(tmp_path, "follows", DECAY, "r[1] = 1.0 + r[0];", flags="")
+    return described(tmp_path, plain, ("</Outputs>", '</Outputs><InitialUnknowns><Unknown index="2"/></InitialUnknowns>'))
 
 
 def check(fmu, *more):
@@ -87,7 +90,7 @@ def test_arrays_in_one_cell_and_truth_values_are_compared(tmp_path):
         one = build_3(tmp_path, "array", reals, step, others=flag, more=more)
         with zipfile.ZipFile(one) as archive:
             entries = {i.filename: archive.read(i) for i in archive.infolist()}
-        entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(b"<ModelStructure>", b'<ModelStructure><Output valueReference="3"/>')
+        entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(b"</ModelStructure>", UNKNOWNS)
         with zipfile.ZipFile(one, "w") as archive:
             [archive.writestr(name, data) for name, data in entries.items()]
         bring(one, "time,y,on\n" + rows)
@@ -158,3 +161,9 @@ def test_a_scenario_traces_too(tmp_path):
     (tmp_path / "s.toml").write_text('[time]\nduration_s = 0.3\n[a]\nfmu = "follows.fmu"\ntrace = "none/calls.txt"\n')
     done = terraglue("run", "s.toml", "--quiet", "--out", "out", cwd=tmp_path)
     assert done.returncode == 2 and "none/calls.txt" in done.stderr, done.stderr
+
+
+def test_a_result_without_any_output_is_no_proof(fmu):
+    bring(fmu, "time\n0\n1\n")
+    code, text = check(fmu)
+    assert code == 1 and "nothing was compared" in text and "without a reference: x" in text, text

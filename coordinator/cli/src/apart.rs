@@ -106,20 +106,22 @@ impl Report {
     }
 }
 
-/// Sends on what a process writes, to standard error, up to a bound.
-fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<()> {
+/// Sends on what a process writes, to standard error, up to a bound. Answers with how many bytes there were.
+fn send_on(mut from: impl Read + Send + 'static) -> JoinHandle<usize> {
     std::thread::spawn(move || {
-        let mut left = MOST_OUTPUT;
+        let mut written = 0;
         let mut bytes = [0; 8192];
         // a process that is gone writes no more
         while let Ok(count @ 1..) = from.read(&mut bytes) {
-            let shown = count.min(left);
+            let shown = count.min(MOST_OUTPUT.saturating_sub(written));
             drop(std::io::stderr().write_all(&bytes[..shown]));
-            if shown < count && left > 0 {
+            if shown < count && written <= MOST_OUTPUT {
                 eprintln!("\nwarning: the FMU has written {} kB; the rest is left out", MOST_OUTPUT >> 10);
+                written = MOST_OUTPUT + 1;
             }
-            left -= shown;
+            written += count;
         }
+        written
     })
 }
 
@@ -180,7 +182,7 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     end_group(child.id());
     drop(child.wait());
     drop(rows.join());
-    outputs.into_iter().flatten().for_each(|output| drop(output.join()));
+    let written = outputs.map(|output| output.and_then(|output| output.join().ok()).unwrap_or(0));
     let lost = |why: &str| {
         let reached = std::fs::read_to_string(folder.path().join(REACHED)).unwrap_or_default();
         let reached = reached.get(..40).map(|t| t.trim().to_owned()).filter(|t| !t.is_empty());
@@ -199,6 +201,9 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let said = std::fs::read_to_string(folder.path().join(DONE)).ok().and_then(|t| t.parse().ok());
     Ok(match status.code().filter(|code| said == Some(*code)) {
         Some(0) => Exit::Done,
+        Some(1 | 2) if written[1] == 0 => {
+            lost("it failed, and its message did not arrive: has the FMU closed standard error?")
+        }
         Some(1) => Exit::Failed,
         Some(2) => Exit::WrongInput,
         Some(130) => Exit::Interrupted,

@@ -203,6 +203,13 @@ fn check(fmu: &Path, within: Option<f64>) -> Result<Exit> {
             outln!("not compared, as the FMU has no such variable: {}", run.foreign.join(", "));
         }
         outln!("{}", deviations(run, within));
+        if !run.lacking.is_empty() {
+            outln!("without a reference: {}", run.lacking.join(", "));
+        }
+        if run.deviations.is_empty() {
+            outln!("{}: nothing was compared: it holds no output of the FMU", run.file);
+            off = true;
+        }
         off |= run.deviations.iter().any(|d| !(d.share <= within));
     }
     Ok(if off { Exit::Failed } else { exit })

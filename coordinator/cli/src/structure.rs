@@ -157,17 +157,18 @@ fn connection(
     Ok(NewConnection { from, to, affine: (own.factor, own.offset), converts: own.convert })
 }
 
-/// The type of a connector.
-fn value_type(variable: &Variable) -> Option<&'static str> {
+/// The type of a connector; none: that of the variable, as of an enumeration, which the description of the FMU defines.
+fn value_type(variable: &Variable) -> Option<Option<&'static str>> {
     if !variable.dimensions.is_empty() {
         return None;
     }
-    Some(match variable.value_type {
+    Some(Some(match variable.value_type {
         ValueType::F64 | ValueType::F32 => "Real",
         ValueType::Bool => "Boolean",
         ValueType::String => "String",
         ValueType::Binary => "Binary",
-        ValueType::Enumeration | ValueType::Clock => return None,
+        ValueType::Enumeration => return Some(None),
+        ValueType::Clock => return None,
         _ => "Integer",
-    })
+    }))
 }

@@ -6,6 +6,7 @@ mod opening;
 use super::array_starts::ArrayStarts;
 use super::bodies::{Axis, Bodies, terminals};
 use super::clocks;
+use super::limits;
 use super::map::{self, ValueLocation};
 use super::rollback;
 use super::settings::{OnNan, options, structure};
@@ -153,6 +154,10 @@ impl FmuSubsystem {
             return Err(Error::Refused(format!("`{name}` of the FMU cannot be set")));
         }
         let v = &self.variables[k];
+        let declared = &self.instance.description().variables[self.places[k].variable as usize];
+        if let Some(x) = value.as_f64() {
+            limits::check(declared, name, &[x]).map_err(error)?;
+        }
         let wrong = || Error::Refused(format!("`{name}` of the FMU does not take {value}"));
         let (number, whole, id) = (value.as_f64(), value.as_i64(), [v.id]);
         macro_rules! narrow {
@@ -169,8 +174,15 @@ impl FmuSubsystem {
             }
             ValueType::Enumeration => {
                 let named = value.as_str().and_then(|t| v.enumeration.iter().position(|n| n == t));
-                let index = named.map(|k| k as i64).or(whole).ok_or_else(wrong)?;
-                self.set(&id, Values::Enumeration(&[index]))
+                // numbers are those of the FMU, as of `fmu run --start`
+                let own = |number: &i64| declared.items.iter().position(|(_, item)| item == number);
+                let index = match whole {
+                    Some(number) if declared.items.is_empty() => Some(number),
+                    Some(number) => own(&number).map(|k| k as i64),
+                    None => named.map(|k| k as i64),
+                };
+                let items = || format!("`{name}` = {value}: {}", limits::items(declared));
+                self.set(&id, Values::Enumeration(&[index.ok_or_else(|| Error::Refused(items()))?]))
             }
             ValueType::I8 => narrow!(I8),
             ValueType::I16 => narrow!(I16),

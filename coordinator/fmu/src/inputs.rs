@@ -1,12 +1,13 @@
 //! Inputs of an FMU that is run alone, from the columns of a table: numbers, arrays, texts and clocks, at communication
 //! points and – numbers of FMUs that follow their inputs – within steps.
 
-use super::map::{element_name, find};
+use super::limits;
+use super::map::{effect, element_name, find};
 use super::table::Table;
 use std::sync::Arc;
 use terraglue_fmi::description::Variable;
 use terraglue_fmi::{Error, FmuInstance, ForeignInstance, ModelDescription, Result, Version};
-use terraglue_subsystem::{ValueType, Values};
+use terraglue_subsystem::{Effect, ValueType, Values};
 
 /// All that a table feeds.
 pub struct Inputs {
@@ -53,9 +54,19 @@ impl Inputs {
         let mut all: Vec<Input> = Vec::new();
         for (column, name) in table.names.iter().enumerate() {
             let (v, element) = place(description, name)?;
+            check(v, name)?;
             let same =
                 |i: &&mut Input| (i.variable.reference, i.variable.value_type) == (v.reference, v.value_type);
             match all.iter_mut().find(same) {
+                Some(input)
+                    if input
+                        .columns
+                        .iter()
+                        .any(|(_, e)| e.is_none() || element.is_none() || *e == element) =>
+                {
+                    let text = format!("`{name}`: two columns of the input feed `{}`", v.name);
+                    return Err(Error::WrongInput(text));
+                }
                 Some(input) => input.columns.push((column, element)),
                 None => all.push(Input {
                     variable: v.clone(),
@@ -151,6 +162,16 @@ pub fn place<'a>(description: &'a ModelDescription, name: &str) -> Result<(&'a V
     }
 }
 
+/// Refuses a column of a variable that cannot be set while the FMU runs.
+fn check(v: &Variable, name: &str) -> Result {
+    let why = match effect(v) {
+        Effect::Live => return Ok(()),
+        Effect::ReadOnly => "it can be read only: columns are inputs and tunable parameters".to_owned(),
+        _ => format!("it is fixed while the FMU runs: `--start {name}=VALUE` sets it before"),
+    };
+    Err(Error::WrongInput(format!("the column `{name}` of the input: {why}")))
+}
+
 impl Input {
     /// The column that counts where several feed it whole.
     fn last(&self) -> usize {
@@ -198,9 +219,11 @@ impl Input {
 }
 
 /// Sets a variable from text; arrays take their elements separated by spaces.
+///
+/// # Errors
+/// [`Error::WrongInput`]: no values of its type, or not so many.
 pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result {
-    let wrong =
-        || Error::WrongInput(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
+    let wrong = || Error::WrongInput(format!("`{}` = {text}: it takes {}", v.name, limits::kind(v)));
     let words: Vec<&str> = text.split_whitespace().collect();
     macro_rules! parsed {
         ($variant:ident, $t:ty) => {{
@@ -220,10 +243,16 @@ pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result 
         ValueType::U16 => parsed!(U16, u16),
         ValueType::U32 => parsed!(U32, u32),
         ValueType::U64 => parsed!(U64, u64),
-        ValueType::Enumeration => match v.items.iter().find(|(name, _)| name == text.trim()) {
-            Some((_, item)) => instance.set(&[v.reference], Values::Enumeration(&[*item])),
-            None => parsed!(Enumeration, i64),
-        },
+        ValueType::Enumeration => {
+            let items: Option<Vec<i64>> = match v.items.iter().find(|(name, _)| name == text.trim()) {
+                Some((_, item)) => Some(vec![*item]),
+                None => words.iter().map(|w| w.parse().ok()).collect(),
+            };
+            let known = |n: &i64| v.items.is_empty() || v.items.iter().any(|(_, item)| item == n);
+            let items = items.filter(|all| all.len() == v.len() && all.iter().all(known));
+            let none = || Error::WrongInput(format!("`{}` = {text}: {}", v.name, limits::items(v)));
+            instance.set(&[v.reference], Values::Enumeration(&items.ok_or_else(none)?))
+        }
         ValueType::Bool => {
             let value = match text {
                 "true" | "1" => true,

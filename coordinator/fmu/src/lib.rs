@@ -15,6 +15,7 @@ mod clocks;
 mod driven_bodies;
 pub mod export;
 mod inputs;
+mod limits;
 mod map;
 pub mod references;
 mod rollback;

@@ -107,7 +107,8 @@ pub fn element_name(v: &fmi::Variable, element: usize) -> String {
     terraglue_subsystem::element_name(&v.name, &v.sizes, element)
 }
 
-fn effect(v: &fmi::Variable) -> Effect {
+/// When a variable can be set.
+pub(super) fn effect(v: &fmi::Variable) -> Effect {
     match (v.causality, v.variability) {
         (fmi::Causality::Input, _) | (fmi::Causality::Parameter, Variability::Tunable) => Effect::Live,
         (fmi::Causality::Parameter | fmi::Causality::StructuralParameter, _) => Effect::NeedsReset,

@@ -8,7 +8,7 @@ use super::simulate::{self, Settings, Tables};
 use super::table::{InputRow, Table};
 use std::fmt::Write;
 use std::sync::Arc;
-use terraglue_fmi::description::Variable;
+use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::instance::Sink;
 use terraglue_fmi::references::{FOLDER, MANIFEST, Related, related};
 use terraglue_fmi::{Error, Fmu, Result};
@@ -36,6 +36,8 @@ pub struct Rerun {
     pub rows: usize,
     /// Of each column.
     pub deviations: Vec<Deviation>,
+    /// Outputs for which it has no column.
+    pub lacking: Vec<String>,
     /// Columns for which the FMU has no variable, as where one file serves FMUs of both versions.
     pub foreign: Vec<String>,
 }
@@ -75,11 +77,21 @@ pub fn rerun(fmu: &Arc<Fmu>, sink: impl Fn() -> Sink) -> Result<Vec<Rerun>> {
         all.push(Rerun {
             file: file.path.display().to_string(),
             rows: wanted.rows.len(),
+            lacking: lacking(fmu, &wanted.names),
             deviations,
             foreign,
         });
     }
     Ok(all)
+}
+
+/// Outputs for which there is no column.
+fn lacking(fmu: &Fmu, columns: &[String]) -> Vec<String> {
+    let compared = variables(fmu, columns);
+    let output = |v: &&Variable| {
+        v.causality == Causality::Output && v.value_type != ValueType::Clock && !compared.contains(&v.name)
+    };
+    fmu.description().variables.iter().filter(output).map(|v| v.name.clone()).collect()
 }
 
 /// The variable of a column, which may be an element of it.
@@ -105,6 +117,7 @@ fn variables(fmu: &Fmu, columns: &[String]) -> Vec<String> {
 /// for which the FMU has no variable.
 fn fitted(fmu: &Fmu, table: &Table) -> Result<(Table, Vec<String>)> {
     let mut fitted = Table {
+        path: table.path.clone(),
         names: Vec::new(),
         rows: table.rows.iter().map(|row| InputRow { time: row.time, ..InputRow::default() }).collect(),
     };

@@ -2,14 +2,15 @@
 
 use super::array_starts::ArrayStarts;
 use super::inputs::{self, Inputs, set_text};
-use super::map::{element_name, find};
+use super::limits;
+use super::map::{effect, element_name, find};
 use super::settings::OnNan;
 use std::cell::Cell;
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::instance::{Sink, Trace};
 use terraglue_fmi::{Advance, Error, Fmu, FmuInstance, FmuState, InstanceOptions, ModelDescription, Result};
-use terraglue_subsystem::{ValueType, ValuesMut};
+use terraglue_subsystem::{Effect, ValueType, ValuesMut};
 
 pub use super::table::{InputRow, Table};
 
@@ -81,13 +82,24 @@ pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
     if between {
         shown_between(description, &settings.outputs)?;
     }
-    // elements are looked for where structural parameters have given arrays their sizes
-    let of_array = |name: &str| {
-        let owner = name.split_once('[').map_or(name, |(owner, _)| owner);
-        description.variables.iter().any(|v| v.name == owner && !v.dimensions.is_empty())
+    settings.start.iter().try_for_each(|(name, _)| can_start(description, name))
+}
+
+/// Refuses a start value of a variable that has none to be set. Elements are looked for where structural parameters have given arrays
+/// their sizes.
+fn can_start(description: &ModelDescription, name: &str) -> Result {
+    let owner = name.split_once('[').map_or(name, |(owner, _)| owner);
+    let array = |v: &&Variable| v.name == owner && !v.dimensions.is_empty();
+    let v = match description.variables.iter().find(array) {
+        Some(v) => v,
+        None => find(description, name)?,
     };
-    let mut others = settings.start.iter().filter(|(name, _)| !of_array(name));
-    others.try_for_each(|(name, _)| find(description, name).map(drop))
+    match effect(v) {
+        Effect::ReadOnly => Err(Error::WrongInput(format!(
+            "`{name}` cannot be set: start values are those of parameters, inputs, and outputs and local variables with initial = \"exact\""
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Runs an FMU and writes its tables. Answers when the FMU itself asked for the end of the run before its time, s.
@@ -239,9 +251,16 @@ fn initialize(instance: &mut FmuInstance, settings: &Settings, (start, stop): (f
             }
             Some(k) => {
                 let wrong = || Error::WrongInput(format!("`{name}` = {text}: it takes a number"));
-                elements.give(v.reference, (k, v.len()), text.trim().parse().map_err(|_| wrong())?);
+                let number: f64 = text.trim().parse().map_err(|_| wrong())?;
+                limits::check(v, name, &[number])?;
+                elements.give(v.reference, (k, v.len()), number);
             }
             None if v.causality != Causality::StructuralParameter => {
+                let numeric = !matches!(v.value_type, ValueType::String | ValueType::Enumeration);
+                let numbers = text.split_whitespace().filter_map(|word| word.parse().ok());
+                if numeric {
+                    limits::check(v, name, &numbers.collect::<Vec<f64>>())?;
+                }
                 set_text(instance.foreign(), v, text)?;
             }
             None => {}

@@ -11,6 +11,8 @@ pub struct Table {
     pub names: Vec<String>,
     /// Rows, ascending in time.
     pub rows: Vec<InputRow>,
+    /// The file that it was read from, for errors.
+    pub path: String,
 }
 
 /// Inputs at a time.
@@ -22,6 +24,8 @@ pub struct InputRow {
     pub cells: Vec<String>,
     /// The same as numbers; NaN where they are none.
     pub numbers: Vec<f64>,
+    /// Line in the file.
+    pub line: u64,
 }
 
 impl Table {
@@ -32,7 +36,9 @@ impl Table {
     /// A malformed table, with path and line.
     pub fn read(path: &Path, jumps: bool) -> Result<Self, String> {
         let file = terraglue_subsystem::files::open(path).map_err(|e| e.to_string());
-        file.and_then(|file| Self::parse(file, jumps)).map_err(|e| format!("{}: {e}", path.display()))
+        let table = file.and_then(|file| Self::parse(file, jumps));
+        let path = path.display().to_string();
+        table.map_err(|e| format!("{path}: {e}")).map(|table| Self { path, ..table })
     }
 
     /// The same from any text.
@@ -46,8 +52,9 @@ impl Table {
             return Err("the first column is not `time`".into());
         }
         let mut rows: Vec<InputRow> = Vec::new();
-        for (record, line) in reader.records().zip(2..) {
-            let record = record.map_err(|e| e.to_string())?;
+        for record in reader.records() {
+            let record = record.map_err(|e| unread(&e))?;
+            let line = record.position().map_or(0, csv::Position::line);
             let mut cells = record.iter().map(|t| t.trim().to_owned());
             let time = cells.next().and_then(|t| t.parse().ok()).filter(|t: &f64| t.is_finite());
             let time = time.ok_or_else(|| format!("line {line}: the time is no number"))?;
@@ -57,9 +64,10 @@ impl Table {
             }
             let cells: Vec<String> = cells.collect();
             let numbers = cells.iter().map(|t| t.parse().unwrap_or(f64::NAN)).collect();
-            rows.push(InputRow { time, cells, numbers });
+            rows.push(InputRow { time, cells, numbers, line });
         }
-        Ok(Self { names: header.iter().skip(1).map(str::to_owned).collect(), rows })
+        let names = header.iter().skip(1).map(str::to_owned).collect();
+        Ok(Self { names, rows, path: String::new() })
     }
 
     /// The last row at or before t, or the first of all, and the row after it.
@@ -122,12 +130,31 @@ impl Table {
 
     /// The error of a column without a number beside t, s.
     pub(super) fn none(&self, column: usize, t: f64) -> Error {
-        Error::WrongInput(format!("`{}`: the input is no number beside t = {t} s", self.names[column]))
+        let name = &self.names[column];
+        let beside = self.around(t).into_iter().flat_map(|(row, next)| std::iter::once(row).chain(next));
+        let mut wrong = beside.filter(|row| !row.numbers[column].is_finite());
+        Error::WrongInput(match wrong.next() {
+            Some(row) => format!(
+                "{}, line {}: `{name}` = `{}` is no number, and the FMU needs one at t = {t} s",
+                self.path, row.line, row.cells[column]
+            ),
+            None => format!("`{name}`: the input is no number beside t = {t} s"),
+        })
     }
 
     /// The cell that holds at t.
     pub(super) fn cell(&self, t: f64, column: usize) -> &str {
         self.around(t).map_or("0", |(row, _)| &row.cells[column])
+    }
+}
+
+/// A record that cannot be read; names of elements of arrays hold a comma.
+fn unread(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { .. } => {
+            format!("{error}; a name with a comma stands in quotes: time,\"u[1,2]\"")
+        }
+        _ => error.to_string(),
     }
 }
 
@@ -140,8 +167,9 @@ mod tests {
             time: *time,
             cells: vec![(*cell).to_owned()],
             numbers: vec![cell.parse().unwrap_or(f64::NAN)],
+            line: 0,
         };
-        Table { names: vec!["u".into()], rows: rows.iter().map(row).collect() }
+        Table { names: vec!["u".into()], rows: rows.iter().map(row).collect(), path: String::new() }
     }
 
     #[test]

@@ -88,9 +88,7 @@ fn end(code: i32) -> ! {
 /// run as an error instead of with success and without a word.
 #[unsafe(no_mangle)]
 pub extern "C" fn _exit(code: libc::c_int) -> ! {
-    if ARMED.load(Ordering::SeqCst) && PROCESS.load(Ordering::SeqCst) == std::process::id() {
-        at_exit();
-    }
+    at_exit();
     end(code)
 }
 
@@ -101,6 +99,10 @@ pub extern "C" fn _Exit(code: libc::c_int) -> ! {
 }
 
 extern "C" fn at_exit() {
+    // a process that a module or FMU has forked is not the run
+    if PROCESS.load(Ordering::SeqCst) != std::process::id() {
+        return;
+    }
     if !ARMED.swap(false, Ordering::SeqCst) {
         return;
     }

@@ -237,11 +237,6 @@ impl Link {
         self.largest.get(k).copied().unwrap_or(0.0)
     }
 
-    /// Whether it leaves a subsystem of some kind.
-    pub fn leaves(&self, kind: impl Fn(usize) -> bool) -> bool {
-        kind(self.from)
-    }
-
     /// Subsystems on either side.
     pub fn slots(&self) -> [usize; 2] {
         [self.from, self.to]
@@ -306,6 +301,17 @@ pub struct Links {
 }
 
 impl Links {
+    /// Whether numbers, and whether other values, are passed on before the first step: where an output depends on an input of the same
+    /// time, or an input belongs to an FMU, whose initialisation may depend on it.
+    pub fn pass_at_start(&self, instances: &[Instance]) -> (bool, bool) {
+        let through = |slot: usize| instances[slot].capabilities().has(Capabilities::FEEDTHROUGH);
+        let is_fmu = |slot: usize| terraglue_scenario::ModuleKind::is_fmu(instances[slot].module());
+        let matters = |[from, to]: [usize; 2]| through(from) || is_fmu(to);
+        let numbers = self.numbers.iter().any(|link| matters(link.slots()));
+        let discrete = self.discrete.iter().any(|link| numbers || matters(link.ends().map(|end| end.slot())));
+        (numbers, discrete)
+    }
+
     /// Subsystem and variable on either side of every value.
     pub fn ends(&self, instances: &[Instance]) -> Vec<[(usize, u32); 2]> {
         let numbers = self.numbers.iter().flat_map(|link| link.ends().map(|(ends, _)| ends));

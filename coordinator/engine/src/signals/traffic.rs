@@ -6,7 +6,6 @@ use super::{Directory, Discrete, Faults, Link, Links, Moment, TimeLine, initiali
 use terraglue_diagnostics::Result;
 use terraglue_gluing::memory::Recall;
 use terraglue_host::Instance;
-use terraglue_subsystem::Capabilities;
 
 /// Signals of a run.
 #[derive(Debug)]
@@ -43,19 +42,17 @@ impl Signals {
         self.time_line.next_time(t).min(self.faults.next_time(t))
     }
 
-    /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops of numbers solved.
+    /// Connected values at the start, where they matter before the first step: in their order, loops of numbers solved.
     ///
     /// # Errors
     /// A loop without a solution, or what a module refuses.
     pub fn initialize(&mut self, instances: &mut [Instance]) -> Result {
-        let through: Vec<bool> =
-            instances.iter().map(|i| i.capabilities().has(Capabilities::FEEDTHROUGH)).collect();
+        let (numbers_pass, discrete_pass) = self.links.pass_at_start(instances);
         let Links { numbers, discrete, .. } = &mut self.links;
-        let numbers_pass = numbers.iter().any(|link| link.leaves(|slot| through[slot]));
         if numbers_pass {
             initialize(numbers, instances)?;
         }
-        if !discrete.iter().any(|link| numbers_pass || through[link.ends()[0].slot()]) {
+        if !discrete_pass {
             return Ok(());
         }
         let before: Vec<Discrete> = discrete.iter().map(|link| link.of_input(instances)).collect();

@@ -4,7 +4,7 @@ use super::checks::{check_groups, check_report};
 use super::declared_glue::{body_states, declared};
 use super::glued::GluedGroups;
 use super::group::Group;
-use super::loops::{Loops, NO_LOOP};
+use super::loops::{Loops, NO_LOOP, open_loops};
 use super::pieces;
 use super::run_clock::RunClock;
 use super::schedule::StepSchedule;
@@ -133,6 +133,7 @@ fn order(
     let loops = Loops::new(links, faults, &feed_through, instances, schedules, state)
         .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
     order.put_behind_loops(loops.followers(), links, instances, schedules);
+    open_loops(links, instances).iter().for_each(|warning| log::warn!("{warning}"));
     Ok((order, loops))
 }
 
@@ -153,7 +154,24 @@ fn signals(scenario: &Scenario, instances: &[Instance]) -> Result<Signals> {
     let time_line = TimeLine::new(&scenario.events, &directory, instances, source)?;
     let random = (scenario.world.seed, scenario.time.step_s);
     let faults = Faults::new(&scenario.faults, &links, &directory, instances, source, random)?;
-    Ok(Signals { links, directory, time_line, faults, told: false })
+    let signals = Signals { links, directory, time_line, faults, told: false };
+    fed_events(scenario, &signals, instances).iter().for_each(|warning| log::warn!("{warning}"));
+    Ok(signals)
+}
+
+/// Warnings of events that set an input which a connection feeds: the next step overwrites it.
+fn fed_events(scenario: &Scenario, signals: &Signals, instances: &[Instance]) -> Vec<String> {
+    let fed = |name: &String| {
+        let found = signals.directory.find(name)?;
+        let id = found.describe(instances).id;
+        signals.is_fed(instances, found.slot(), id).then(|| {
+            format!(
+                "an event sets `{name}`, which a connection feeds: it has no effect, as the connection sets it at every step; `[[fault]]` \
+                 changes values on their way"
+            )
+        })
+    };
+    scenario.events.iter().flat_map(|e| e.set.iter()).filter_map(|(name, _)| fed(name)).collect()
 }
 
 /// Groups with the detection of their contacts.

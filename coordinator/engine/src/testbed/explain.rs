@@ -10,7 +10,6 @@ use crate::signals::{Links, VariableRef, streams};
 use serde::{Deserialize, Serialize};
 use terraglue_host::Instance;
 use terraglue_scenario::{Extrapolate, Scenario};
-use terraglue_subsystem::Capabilities;
 
 /// Output of `terraglue run --explain`, also shown in the report; nothing in it was measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -119,9 +118,8 @@ impl Explained<'_> {
     fn order(&self, ends: &[ConnectionEnds]) -> Vec<String> {
         let name = |slot: usize| self.instances[slot].name();
         let mut order = Vec::new();
-        let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
-        let discrete = self.links.discrete.iter().any(|l| through(l.ends()[0].slot()));
-        if discrete || self.links.numbers.iter().any(|l| l.leaves(through)) {
+        let (numbers, discrete) = self.links.pass_at_start(self.instances);
+        if numbers || discrete {
             order.push(
                 "once, at the start: connected values are passed on until they agree, loops of numbers by Newton".into(),
             );

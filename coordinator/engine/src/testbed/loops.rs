@@ -299,6 +299,32 @@ impl Loops {
     }
 }
 
+/// Warnings of connections that are to be iterated, in a loop that another connection opens by a delay.
+pub(super) fn open_loops(links: &Links, instances: &[Instance]) -> Vec<String> {
+    let every: Vec<[usize; 2]> = links.numbers.iter().map(Link::slots).collect();
+    let whole = components(instances.len(), &every);
+    let within = components(instances.len(), &edges(links, instances));
+    let is_open = |link: &&Link| {
+        let [from, to] = link.slots();
+        link.is_iterated() && from != to && whole[from] == whole[to] && within[from] != within[to]
+    };
+    let warning = |link: &Link| {
+        let own = whole[link.slots()[0]];
+        let delays = |l: &&Link| {
+            l.slots().iter().all(|slot| whole[*slot] == own) && !l.is_within_the_step() && !l.is_iterated()
+        };
+        let late: Vec<String> =
+            links.numbers.iter().filter(delays).flat_map(|l| l.names(instances)).collect();
+        format!(
+            "{} is to be iterated, but its loop is open: {} passes its value with a delay of a step; `order = \"iterate\"` there \
+             closes it",
+            link.names(instances).join(", "),
+            late.join(", ")
+        )
+    };
+    links.numbers.iter().filter(is_open).map(warning).collect()
+}
+
 /// Subsystems that pass values to others within a step.
 fn edges(links: &Links, instances: &[Instance]) -> Vec<[usize; 2]> {
     let numbers = links.numbers.iter().filter(|link| link.is_within_the_step() || link.is_iterated());

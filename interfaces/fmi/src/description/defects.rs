@@ -9,8 +9,11 @@ use terraglue_subsystem::ValueType;
 /// Finds defects of one variable.
 type Rule = fn(&ModelDescription, &Variable) -> Option<String>;
 
-const RULES: [(DefectKind, Rule); 13] = [
+const RULES: [(DefectKind, Rule); 16] = [
     (DefectKind::Enumeration, enumeration),
+    (DefectKind::Enumeration, same_items),
+    (DefectKind::Role, initial),
+    (DefectKind::Role, clocked),
     (DefectKind::Range, range),
     (DefectKind::StartRange, start_range),
     (DefectKind::StartCount, start_count),
@@ -78,6 +81,27 @@ fn grouped(defects: &[Defect]) -> Vec<String> {
 fn enumeration(_: &ModelDescription, v: &Variable) -> Option<String> {
     (v.value_type == ValueType::Enumeration && v.items.is_empty())
         .then(|| "is an enumeration without a declared type that lists its items".into())
+}
+
+fn same_items(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let twice = |(k, (_, number)): (usize, &(String, i64))| {
+        v.items[..k].iter().any(|(_, other)| other == number).then_some(*number)
+    };
+    let number = v.items.iter().enumerate().find_map(twice)?;
+    Some(format!("is an enumeration with two items of the value {number}"))
+}
+
+/// Inputs and the independent variable start exactly, and say nothing of it (FMI 2.0.4 §2.2.7, FMI 3.0.2 §2.4.7.5).
+fn initial(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let silent = matches!(v.causality, Causality::Input | Causality::Independent);
+    (silent && v.initial.is_some())
+        .then(|| format!("is {:?} and has `initial`, which it must not", v.causality))
+}
+
+/// A variable that belongs to clocks changes when they tick (FMI 3.0.2 §2.4.7.4).
+fn clocked(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let continuous = v.variability == Variability::Continuous && !v.clocks.is_empty();
+    continuous.then(|| "belongs to clocks and is continuous, where discrete is wanted".to_owned())
 }
 
 /// Name of a type in the standards.

@@ -13,7 +13,46 @@ pub fn defects(root: &Element, version: Version, experiment: &Experiment) -> Vec
     let mut all = display_units(root, version);
     all.extend(dependency_kinds(root, version));
     all.extend(of_experiment(root, experiment));
+    all.extend(counts(root));
+    if version == Version::V2 {
+        all.extend(parameters_2(root));
+    }
     all
+}
+
+/// Counts and lengths that are negative, or no numbers.
+fn counts(root: &Element) -> Vec<Defect> {
+    let below = |name: &str| root.child(name);
+    let places = [
+        (Some(*root), "numberOfEventIndicators"),
+        (below("CoSimulation"), "maxOutputDerivativeOrder"),
+        (below("CoSimulation"), "fixedInternalStepSize"),
+    ];
+    let defect = |(element, name): (Option<Element>, &str)| {
+        let element = element?;
+        let text = element.attribute(name)?;
+        let wrong = text.trim().parse().map_or(true, |x: f64| !(x >= 0.0 && x.is_finite()));
+        let message = format!("{name} = \"{}\" is no number of at least 0", printable(text));
+        wrong.then(|| Defect { kind: DefectKind::Attribute, line: Some(element.line()), message })
+    };
+    places.into_iter().filter_map(defect).collect()
+}
+
+/// Parameters of FMI 2 without a variability: the default is continuous, which no parameter can be (FMI 2.0.4 §2.2.7).
+fn parameters_2(root: &Element) -> Vec<Defect> {
+    let Some(list) = root.child("ModelVariables") else { return Vec::new() };
+    let mut lines = LineCounter::of(root);
+    let parameter = |e: &Element| matches!(e.text("causality"), "parameter" | "calculatedParameter");
+    let silent = list.children().filter(|e| parameter(e) && e.attribute("variability").is_none());
+    let defect = |e: Element| Defect {
+        kind: DefectKind::Role,
+        line: Some(lines.line(&e)),
+        message: format!(
+            "`{}` is a parameter without variability, which is continuous then; it is taken as fixed",
+            printable(e.text("name"))
+        ),
+    };
+    silent.map(defect).collect()
 }
 
 /// Display units that the unit does not define.

@@ -60,6 +60,12 @@ impl Clocks {
         }
     }
 
+    /// The run starts at this time, s: shifts of clocks count from there (FMI 3.0.2, 2.2.9, t0 = t_start + T_shift).
+    pub(super) fn begin(&mut self, start: f64) {
+        self.periodic.iter_mut().for_each(|(_, ticks)| ticks.shift += start);
+        self.told.begin(start);
+    }
+
     /// The first tick after t that is known, or `end`, s.
     #[inline]
     pub(super) fn next(&self, t: f64, end: f64) -> f64 {

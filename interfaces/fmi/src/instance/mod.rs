@@ -326,7 +326,12 @@ impl FmuInstance {
         if self.updates {
             self.foreign.log.updates.watch(&self.shown, &self.description);
         }
-        self.foreign.trace(format_args!("from {start:?} s to {stop:?} s, tolerance {tolerance:?}"));
+        let said = |x: Option<f64>, unit: &str| x.map_or("none".to_owned(), |x| format!("{x:?}{unit}"));
+        self.foreign.trace(format_args!(
+            "start {start:?} s, stop {}, tolerance {}",
+            said(stop, " s"),
+            said(tolerance, "")
+        ));
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         match self.foreign.api {
@@ -371,7 +376,7 @@ impl FmuInstance {
                     |f, c| unsafe { f(c) },
                 )?;
                 if self.event_mode {
-                    self.clocks.told.begin(self.start);
+                    self.clocks.begin(self.start);
                     self.clocks.tick(&self.foreign, self.start, true)?;
                     self.clocks.forget_triggers();
                     self.update_discrete_states(self.start)?;

@@ -249,7 +249,9 @@ impl FmuInstance {
         if early && last >= t - tolerance && last < stop {
             return PartEnd::Before;
         }
-        if is_of_solver(self, last, off) || (0.0..=PAST * (stop - t)).contains(&off) {
+        // one that went on by a part of a step of its own cannot be taken back: it is at the end of the step
+        let own = self.description.capabilities.fixed_step.unwrap_or(0.0) * (1.0 + 1e-6);
+        if is_of_solver(self, last, off) || (0.0..=own.max(PAST * (stop - t))).contains(&off) {
             own_time(self, last, stop);
             return PartEnd::Stop;
         }

@@ -11,8 +11,9 @@ pub struct NewComponent {
     pub name: String,
     /// File in the archive.
     pub source: String,
-    /// Name, `input` or `output`, and type (`Real`, `Integer`, `Boolean`, `String`, `Binary`) of each connector.
-    pub connectors: Vec<(String, &'static str, &'static str)>,
+    /// Name, `input` or `output`, and type (`Real`, `Integer`, `Boolean`, `String`, `Binary`) of each connector; no type: that of the variable
+    /// of the FMU.
+    pub connectors: Vec<(String, &'static str, Option<&'static str>)>,
     /// Values of variables at the start.
     pub values: Vec<(String, Value)>,
 }
@@ -70,7 +71,9 @@ fn component(xml: &mut Xml, c: &NewComponent) {
         xml.open("ssd:Connectors", &[]);
         for (name, kind, value_type) in &c.connectors {
             xml.open("ssd:Connector", &[("name", name), ("kind", kind)]);
-            xml.leaf(&format!("ssc:{value_type}"), &[]);
+            if let Some(value_type) = value_type {
+                xml.leaf(&format!("ssc:{value_type}"), &[]);
+            }
             xml.close("ssd:Connector");
         }
         xml.close("ssd:Connectors");

@@ -131,6 +131,11 @@ def test_exact_outputs_are_no_initial_unknowns_and_states_are(tmp_path):
         (2, "<CoSimulation ", '<CoSimulation maxOutputDerivativeOrder="-3" ', "maxOutputDerivativeOrder"),
         (3, "<CoSimulation ", '<CoSimulation fixedInternalStepSize="-1" ', "fixedInternalStepSize"),
         (3, 'causality="output"', 'causality="output" clocks="8"', "`y` belongs to clocks and is continuous"),
+        (3, "</ModelStructure>", '<EventIndicator valueReference="99"/></ModelStructure>', "<EventIndicator> of ModelStructure: no variable has the valueReference `99`"),
+        (2, "</Outputs>", '</Outputs><Derivatives><Unknown index="9"/></Derivatives>', "<Unknown> of ModelStructure: no variable has the index `9`"),
+        (2, "<CoSimulation ", '<DefaultExperiment stopTime="1"/><CoSimulation ', "<CoSimulation> stands behind <DefaultExperiment>"),
+        (3, "</ModelStructure>", '</ModelStructure><LogCategories/>', "<LogCategories> stands behind <ModelStructure>"),
+        (3, "</ModelStructure>", '</ModelStructure><Other/>', "<Other> is no element of the standard"),
     ],
 )
 def test_further_faults_are_reported(tmp_path, version, before, after, message):

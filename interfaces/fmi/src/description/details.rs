@@ -14,10 +14,62 @@ pub fn defects(root: &Element, version: Version, experiment: &Experiment) -> Vec
     all.extend(dependency_kinds(root, version));
     all.extend(of_experiment(root, experiment));
     all.extend(counts(root));
+    all.extend(order(root, version));
     if version == Version::V2 {
         all.extend(parameters_2(root));
     }
     all
+}
+
+/// Elements of the description in their order (schemas of FMI 2.0.4 and 3.0.2).
+const ORDER_2: &[&str] = &[
+    "CoSimulation",
+    "UnitDefinitions",
+    "TypeDefinitions",
+    "LogCategories",
+    "DefaultExperiment",
+    "VendorAnnotations",
+    "ModelVariables",
+    "ModelStructure",
+];
+const ORDER_3: &[&str] = &[
+    "ModelExchange",
+    "CoSimulation",
+    "ScheduledExecution",
+    "UnitDefinitions",
+    "TypeDefinitions",
+    "LogCategories",
+    "DefaultExperiment",
+    "ModelVariables",
+    "ModelStructure",
+    "Annotations",
+];
+
+/// The first element that the standard does not know, or that stands behind one which it comes before.
+fn order(root: &Element, version: Version) -> Option<Defect> {
+    let order = if version == Version::V2 { ORDER_2 } else { ORDER_3 };
+    let place = |e: &Element| {
+        // of FMI 2, both interfaces come first, in any order
+        let name =
+            if version == Version::V2 && e.name() == "ModelExchange" { "CoSimulation" } else { e.name() };
+        order.iter().position(|known| *known == name)
+    };
+    let mut last: Option<(usize, &str)> = None;
+    for element in root.children() {
+        let (name, at) = (element.name(), place(&element));
+        let message = match (at, last) {
+            (None, _) => format!("<{}> is no element of the standard", printable(name)),
+            (Some(at), Some((before, other))) if at < before => {
+                format!("<{name}> stands behind <{other}>, and comes before it in the standard")
+            }
+            (Some(at), _) => {
+                last = Some((at, name));
+                continue;
+            }
+        };
+        return Some(Defect { kind: DefectKind::Attribute, line: Some(element.line()), message });
+    }
+    None
 }
 
 /// Counts and lengths that are negative, or no numbers.

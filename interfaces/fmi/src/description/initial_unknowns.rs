@@ -1,4 +1,4 @@
-//! Whether the list of initial unknowns is that of the standards (FMI 2.0.4 §2.2.8, FMI 3.0.2 §2.4.8): outputs and calculated parameters that
+//! Whether what the model structure lists besides outputs is there, and whether the list of initial unknowns is that of the standards (FMI 2.0.4 §2.2.8, FMI 3.0.2 §2.4.8): outputs and calculated parameters that
 //! are not exact at the start, and continuous states and their derivatives likewise.
 
 use super::element::Element;
@@ -19,11 +19,30 @@ pub fn defects(root: &Element, description: &ModelDescription) -> Vec<Defect> {
     let listed: BTreeSet<usize> = description.initial_unknowns.iter().map(|u| u.variable).collect();
     let wanted = wanted(&structure, description);
     let line = structure.line();
+    let lookup = Lookup::of(description);
+    let lost = listed_besides(&structure, description.version).filter_map(|e| lost(&e, &lookup));
     let lacks = message(description, wanted.difference(&listed), "is not listed", "are not listed");
     let extra =
         message(description, listed.difference(&wanted), "does not belong there", "do not belong there");
     let defect = |message| Defect { kind: DefectKind::InitialUnknowns, line: Some(line), message };
-    lacks.into_iter().chain(extra).map(defect).collect()
+    lost.chain(lacks.into_iter().chain(extra).map(defect)).collect()
+}
+
+/// Elements of the structure that a run does not read: derivatives, clocked states, event indicators.
+fn listed_besides<'a>(structure: &Element<'a>, version: Version) -> impl Iterator<Item = Element<'a>> {
+    let list = structure.child("Derivatives").filter(|_| version == Version::V2);
+    let three = ["ContinuousStateDerivative", "ClockedState", "EventIndicator"];
+    let own = structure.children().filter(move |e| version == Version::V3 && three.contains(&e.name()));
+    list.into_iter().flat_map(|list| list.children()).chain(own)
+}
+
+/// The defect of an element that names no variable.
+fn lost(element: &Element, lookup: &Lookup) -> Option<Defect> {
+    let (key, name) = (lookup.key(), element.name());
+    let number = element.text(key);
+    let found = number.trim().parse().ok().and_then(|number| lookup.find(number));
+    let message = format!("<{name}> of ModelStructure: no variable has the {key} `{}`", printable(number));
+    found.is_none().then(|| Defect { kind: DefectKind::Structure, line: Some(element.line()), message })
 }
 
 /// Positions of the variables that are to be listed.
@@ -44,19 +63,11 @@ fn wanted(structure: &Element, d: &ModelDescription) -> BTreeSet<usize> {
     all
 }
 
-/// Positions of the derivatives that the structure lists; those that lead nowhere are defects of their own.
+/// Positions of the derivatives that the structure lists.
 fn derivatives(structure: &Element, version: Version, lookup: &Lookup) -> Vec<usize> {
     let position = |e: Element| lookup.find(e.attribute(lookup.key())?.trim().parse().ok()?);
-    match version {
-        Version::V2 => {
-            let lists = structure.child("Derivatives").into_iter();
-            lists.flat_map(|list| list.children()).filter_map(position).collect()
-        }
-        Version::V3 => {
-            let listed = structure.children().filter(|e| e.name() == "ContinuousStateDerivative");
-            listed.filter_map(position).collect()
-        }
-    }
+    let derivative = |e: &Element| matches!(e.name(), "Unknown" | "ContinuousStateDerivative");
+    listed_besides(structure, version).filter(derivative).filter_map(position).collect()
 }
 
 /// Whether the start value is exact, by the table of defaults where `initial` is not given.

@@ -69,6 +69,9 @@ pub fn done(code: u8) {
 /// Bytes of what a process writes beside its rows that are shown, of each of its two outputs.
 const MOST_OUTPUT: usize = 1 << 20;
 
+/// Why a process failed that has said nothing.
+const UNHEARD: &str = "it failed, and its message did not arrive: has the FMU closed standard error?";
+
 /// File with the time of the last row.
 const REACHED: &str = "reached";
 
@@ -201,9 +204,7 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let said = std::fs::read_to_string(folder.path().join(DONE)).ok().and_then(|t| t.parse().ok());
     Ok(match status.code().filter(|code| said == Some(*code)) {
         Some(0) => Exit::Done,
-        Some(1 | 2) if written[1] == 0 => {
-            lost("it failed, and its message did not arrive: has the FMU closed standard error?")
-        }
+        Some(1 | 2) if written[1] == 0 => lost(UNHEARD),
         Some(1) => Exit::Failed,
         Some(2) => Exit::WrongInput,
         Some(130) => Exit::Interrupted,

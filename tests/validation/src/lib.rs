@@ -165,13 +165,16 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
 }
 
+/// The name of an area, and its figures.
+type AreaFigures = (&'static str, Vec<Figure>);
+
 /// Figures that were measured, and what is wrong with them.
 struct Verdicts<'a> {
     arguments: &'a Arguments,
     context: &'a Context,
     known: KnownFailures,
     stored: StoredFigures,
-    figures: Vec<(&'static str, Vec<Figure>)>,
+    figures: Vec<AreaFigures>,
     complaints: Vec<String>,
 }
 
@@ -206,7 +209,7 @@ impl<'a> Verdicts<'a> {
     fn finish(
         mut self,
         areas: impl Iterator<Item = &'static str>,
-    ) -> Outcome<(Vec<(&'static str, Vec<Figure>)>, Vec<String>)> {
+    ) -> Outcome<(Vec<AreaFigures>, Vec<String>)> {
         let order: Vec<&str> = areas.collect();
         self.figures.sort_by_key(|(area, _)| order.iter().position(|name| name == area));
         for (area, figures) in &self.figures {

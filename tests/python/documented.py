@@ -13,7 +13,7 @@ import subprocess
 import zipfile
 from typing import NamedTuple
 
-from cfmu import build
+from cfmu import build, described
 from conftest import PROGRAM, ROOT, terraglue
 from test_new_scenario import quadruped
 
@@ -200,7 +200,9 @@ def copied(source):
 
 
 def pump(place, name):
-    build(place, "pump", [("y", "output", 0, ""), ("k", "parameter", 1, "")], "r[0] += r[1] * h;")
+    plain = build(place, "pump", [("y", "output", 0, ""), ("k", "parameter", 1, "")], "r[0] += r[1] * h;")
+    unknowns = '</Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns>'
+    described(place, plain, ("</Outputs>", unknowns)).replace(plain)
 
 
 def plant(place, name):

@@ -1,5 +1,6 @@
 """Runs the program as a user would: short scenarios into temporary folders."""
 
+import csv
 import json
 import os
 import pathlib
@@ -48,6 +49,14 @@ def terraglue(*arguments, cwd=ROOT, timeout=300):
     """The finished process; output as text."""
     command = [PROGRAM, *map(str, arguments)]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout)
+
+
+def recorded(folder, text, *arguments):
+    """A scenario of that text, run in the folder: (process, its rows as printed)."""
+    (folder / "s.toml").write_text(text)
+    done = terraglue("run", "s.toml", "--csv", "--quiet", "--no-report", "--out", "out", *arguments, cwd=folder, timeout=120)
+    table = folder / "out/variables.csv"
+    return done, list(csv.DictReader(table.open())) if done.returncode == 0 else []
 
 
 @pytest.fixture(scope="session")

@@ -5,22 +5,21 @@ import zipfile
 
 import pytest
 from cfmu import build, build_3
-from conftest import terraglue
+from conftest import recorded, terraglue
 
 LAG = [("u", "input", 0.0, ""), ("x", "output", 0.0, "")]
 ITEMS = '<SimpleType name="T"><Enumeration><Item name="one" value="1"/><Item name="two" value="2"/><Item name="three" value="3"/></Enumeration></SimpleType>'
 CHOICE = '<ScalarVariable name="e" valueReference="0" causality="{}" variability="{}"><Enumeration declaredType="T"{}/></ScalarVariable>'
 
 
-def run(folder, text, *arguments):
-    (folder / "s.toml").write_text(text)
-    return terraglue("run", "s.toml", "--csv", "--quiet", "--no-report", "--out", "out", *arguments, cwd=folder, timeout=120)
+def run(folder, text):
+    return recorded(folder, text)[0]
 
 
 def rows(folder, text):
-    done = run(folder, text)
+    done, found = recorded(folder, text)
     assert done.returncode == 0, done.stderr
-    return list(csv.DictReader((folder / "out/variables.csv").open()))
+    return found
 
 
 def time(step, duration):

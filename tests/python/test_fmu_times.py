@@ -4,7 +4,7 @@ import csv
 
 import pytest
 from cfmu import build, build_3
-from conftest import terraglue
+from conftest import recorded, terraglue
 
 INTEGRAL = [("u", "input", 0.0, ""), ("x", "output", 0.0, "")]
 SHOWN = [("y", "output", 0.0, ""), ("t", "output", 0.0, ""), ("h", "output", 0.0, "")]
@@ -13,10 +13,9 @@ SHOWN = [("y", "output", 0.0, ""), ("t", "output", 0.0, ""), ("h", "output", 0.0
 def scenario(folder, tables, step, duration, connections=""):
     text = f"[time]\nstep_s = {step!r}\nduration_s = {duration!r}\n[recording]\nevery_steps = 1\ndigits = 17\n"
     text += "".join(f'[{name}]\nfmu = "{name}.fmu"\n{keys}\n' for name, keys in tables.items())
-    (folder / "s.toml").write_text(text + connections)
-    done = terraglue("run", "s.toml", "--csv", "--quiet", "--no-report", "--out", "out", cwd=folder)
+    done, rows = recorded(folder, text + connections)
     assert done.returncode == 0, done.stderr
-    return list(csv.DictReader((folder / "out/variables.csv").open())), done.stderr
+    return rows, done.stderr
 
 
 def alone(folder, name, *arguments):

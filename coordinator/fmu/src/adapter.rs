@@ -173,16 +173,13 @@ impl FmuSubsystem {
                 self.set(&id, Values::String(&[value.as_str().ok_or_else(wrong)?.to_owned()]))
             }
             ValueType::Enumeration => {
-                let named = value.as_str().and_then(|t| v.enumeration.iter().position(|n| n == t));
-                // numbers are those of the FMU, as of `fmu run --start`
-                let own = |number: &i64| declared.items.iter().position(|(_, item)| item == number);
-                let index = match whole {
-                    Some(number) if declared.items.is_empty() => Some(number),
-                    Some(number) => own(&number).map(|k| k as i64),
-                    None => named.map(|k| k as i64),
-                };
-                let items = || format!("`{name}` = {value}: {}", limits::items(declared));
-                self.set(&id, Values::Enumeration(&[index.ok_or_else(|| Error::Refused(items()))?]))
+                // numbers are those of the FMU, as of `fmu run --start`; `set` takes places in the list of items
+                let named = value.as_str().and_then(|text| limits::named_item(declared, text));
+                let number = named.or(whole.filter(|number| limits::is_item(declared, *number)));
+                let none = || Error::Refused(format!("`{name}` = {value}: {}", limits::items(declared)));
+                let number = number.ok_or_else(none)?;
+                let place = declared.items.iter().position(|(_, item)| *item == number);
+                self.set(&id, Values::Enumeration(&[place.map_or(number, |place| place as i64)]))
             }
             ValueType::I8 => narrow!(I8),
             ValueType::I16 => narrow!(I16),

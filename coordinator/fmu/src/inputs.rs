@@ -244,12 +244,12 @@ pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result 
         ValueType::U32 => parsed!(U32, u32),
         ValueType::U64 => parsed!(U64, u64),
         ValueType::Enumeration => {
-            let items: Option<Vec<i64>> = match v.items.iter().find(|(name, _)| name == text.trim()) {
-                Some((_, item)) => Some(vec![*item]),
+            let items: Option<Vec<i64>> = match limits::named_item(v, text.trim()) {
+                Some(item) => Some(vec![item]),
                 None => words.iter().map(|w| w.parse().ok()).collect(),
             };
-            let known = |n: &i64| v.items.is_empty() || v.items.iter().any(|(_, item)| item == n);
-            let items = items.filter(|all| all.len() == v.len() && all.iter().all(known));
+            let items =
+                items.filter(|all| all.len() == v.len() && all.iter().all(|n| limits::is_item(v, *n)));
             let none = || Error::WrongInput(format!("`{}` = {text}: {}", v.name, limits::items(v)));
             instance.set(&[v.reference], Values::Enumeration(&items.ok_or_else(none)?))
         }

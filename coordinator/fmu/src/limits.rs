@@ -17,6 +17,16 @@ pub fn check(v: &Variable, name: &str, numbers: &[f64]) -> Result {
     }))
 }
 
+/// Whether an enumeration may have this number: that of an item, or any where the description lists none.
+pub fn is_item(v: &Variable, number: i64) -> bool {
+    v.items.is_empty() || v.items.iter().any(|(_, item)| *item == number)
+}
+
+/// The number of an item by its name.
+pub fn named_item(v: &Variable, name: &str) -> Option<i64> {
+    v.items.iter().find(|(item, _)| item == name).map(|(_, number)| *number)
+}
+
 /// The items of an enumeration with their numbers, for an error.
 pub fn items(v: &Variable) -> String {
     let all: Vec<String> = v.items.iter().map(|(name, number)| format!("{name} = {number}")).collect();

@@ -238,35 +238,44 @@ fn plan(fmu: &Fmu, settings: &Settings) -> Result<Plan> {
     Ok(Plan { start, stop, step, steps })
 }
 
+/// Sets start values but those of structural parameters.
+fn set_starts(instance: &FmuInstance, start: &[(String, String)]) -> Result {
+    let description = instance.description().clone();
+    let mut elements = ArrayStarts::default();
+    for (name, text) in start {
+        let (v, element) = inputs::place(&description, name)?;
+        let Some(k) = element else {
+            set_start(instance, v, text)?;
+            continue;
+        };
+        if start.iter().any(|(other, _)| *other == v.name) {
+            let message = format!("`{}` is given whole and by element: `{name}`", v.name);
+            return Err(Error::WrongInput(message));
+        }
+        let wrong = || Error::WrongInput(format!("`{name}` = {text}: it takes a number"));
+        let number: f64 = text.trim().parse().map_err(|_| wrong())?;
+        limits::check(v, name, &[number])?;
+        elements.give(v.reference, (k, v.len()), number);
+    }
+    elements.set(instance)
+}
+
+/// Sets the start value of a whole variable; structural parameters have theirs already.
+fn set_start(instance: &FmuInstance, v: &Variable, text: &str) -> Result {
+    if v.causality == Causality::StructuralParameter {
+        return Ok(());
+    }
+    if !matches!(v.value_type, ValueType::String | ValueType::Enumeration) {
+        let numbers = text.split_whitespace().filter_map(|word| word.parse().ok());
+        limits::check(v, &v.name, &numbers.collect::<Vec<f64>>())?;
+    }
+    set_text(instance.foreign(), v, text)
+}
+
 /// Start values and the initialisation from a start to a stop; the inputs over time, which are set.
 fn initialize(instance: &mut FmuInstance, settings: &Settings, (start, stop): (f64, f64)) -> Result<Inputs> {
     let description = instance.description().clone();
-    let mut elements = ArrayStarts::default();
-    for (name, text) in &settings.start {
-        let (v, element) = inputs::place(&description, name)?;
-        match element {
-            Some(_) if settings.start.iter().any(|(other, _)| *other == v.name) => {
-                let message = format!("`{}` is given whole and by element: `{name}`", v.name);
-                return Err(Error::WrongInput(message));
-            }
-            Some(k) => {
-                let wrong = || Error::WrongInput(format!("`{name}` = {text}: it takes a number"));
-                let number: f64 = text.trim().parse().map_err(|_| wrong())?;
-                limits::check(v, name, &[number])?;
-                elements.give(v.reference, (k, v.len()), number);
-            }
-            None if v.causality != Causality::StructuralParameter => {
-                let numeric = !matches!(v.value_type, ValueType::String | ValueType::Enumeration);
-                let numbers = text.split_whitespace().filter_map(|word| word.parse().ok());
-                if numeric {
-                    limits::check(v, name, &numbers.collect::<Vec<f64>>())?;
-                }
-                set_text(instance.foreign(), v, text)?;
-            }
-            None => {}
-        }
-    }
-    elements.set(instance)?;
+    set_starts(instance, &settings.start)?;
     let tolerance = settings.tolerance.or(description.experiment.tolerance);
     instance.enter_initialization(start, Some(stop), tolerance)?;
     let inputs = Inputs::find(instance, &settings.input, settings.hold_inputs)?;

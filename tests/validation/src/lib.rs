@@ -242,9 +242,8 @@ fn measure(
         let group = if context.timing || ALONE.contains(&area) { &mut alone } else { &mut beside };
         group.extend(chosen(parts, context.part.as_deref())?.iter().map(|part| (area, *part)));
     }
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let mut failures = Vec::new();
-    for (threads, jobs) in [(processors, beside), (1, alone)] {
+    for (threads, jobs) in [(parallel::processors(), beside), (1, alone)] {
         let job = |(area, (part, measure)): &(&str, Part)| {
             if std::io::stderr().is_terminal() {
                 eprintln!("measuring {area}: {part}");

@@ -2,8 +2,9 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError, mpsc};
+use std::sync::mpsc;
 
 thread_local! {
     /// Whether other jobs run beside that of this thread: two bars would overwrite each other.
@@ -12,31 +13,26 @@ thread_local! {
 
 /// `job` on every item, on as many threads as there are processors; answers in the order of the items.
 pub fn in_parallel<T: Sync, R: Send>(items: &[T], job: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let style = ProgressStyle::with_template("{bar:32} {pos} of {len} runs  {eta} left");
     let bar = match IS_BESIDE_OTHERS.get() {
         true => ProgressBar::hidden(),
         false => ProgressBar::new(items.len() as u64),
     };
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let work = || {
-        while let Some((k, item)) =
-            Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|k| Some((k, items.get(k)?)))
-        {
-            let answer = job(item);
-            bar.inc(1);
-            done.lock().unwrap_or_else(PoisonError::into_inner).push((k, answer));
-        }
+    let counted = |item: &T| {
+        let answer = job(item);
+        bar.inc(1);
+        answer
     };
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(work);
-        }
-    });
+    let mut answers = Vec::with_capacity(items.len());
+    in_order(processors(), items, counted, |_, answer| answers.push(answer));
     bar.finish_and_clear();
-    let mut answers = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    answers.sort_by_key(|(k, _)| *k);
-    answers.into_iter().map(|(_, answer)| answer).collect()
+    answers
+}
+
+/// Number of processors.
+pub fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// `job` on every item, on so many threads; `each` gets the answers in the order of the items, as soon as they are there.
@@ -63,7 +59,7 @@ pub fn in_order<T: Sync, R: Send>(
             });
         }
         drop(sender);
-        let mut early = std::collections::BTreeMap::new();
+        let mut early = BTreeMap::new();
         let mut shown = 0;
         for (k, answer) in receiver {
             early.insert(k, answer);

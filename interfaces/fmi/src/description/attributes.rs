@@ -3,6 +3,7 @@
 use super::element::{Element, LineCounter};
 use super::model::{Defect, DefectKind, Version};
 use super::printable;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Elements, and their attributes.
 type Table = &'static [(&'static [&'static str], &'static [&'static str])];
@@ -131,17 +132,14 @@ const THREE: Table = &[
 
 /// One defect for each unknown attribute. Elements that the standards do not know, and annotations, are not looked into.
 pub fn defects(root: &Element, version: Version) -> Vec<Defect> {
-    let own = if version == Version::V2 { TWO } else { THREE };
+    let known = known(version);
     let mut lines = LineCounter::of(root);
     let mut all = Vec::new();
     let mut below = vec![*root];
     while let Some(element) = below.pop() {
-        let attributes = known(&[COMMON, own], element.name());
-        if attributes.is_empty() {
-            continue;
-        }
+        let Some(attributes) = known.get(element.name()) else { continue };
         let unknown = element.node.attributes().filter(|a| a.namespace().is_none());
-        let unknown = unknown.filter(|a| !attributes.iter().any(|names| names.contains(&a.name())));
+        let unknown = unknown.filter(|a| !attributes.contains(a.name()));
         all.extend(unknown.map(|a| {
             let (owner, name) = (element.name(), printable(a.name()));
             let message = format!("<{owner}> has the attribute `{name}`, which is not one of the standard");
@@ -156,8 +154,12 @@ pub fn defects(root: &Element, version: Version) -> Vec<Defect> {
     all
 }
 
-/// The attributes of an element in parts; none where it is unknown.
-fn known(tables: &[Table], element: &str) -> Vec<&'static [&'static str]> {
-    let rows = tables.iter().flat_map(|table| table.iter());
-    rows.filter(|(elements, _)| elements.contains(&element)).map(|(_, attributes)| *attributes).collect()
+/// The attributes of each element that a version knows.
+fn known(version: Version) -> BTreeMap<&'static str, BTreeSet<&'static str>> {
+    let own = if version == Version::V2 { TWO } else { THREE };
+    let mut all: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
+    for (elements, attributes) in COMMON.iter().chain(own) {
+        elements.iter().for_each(|element| all.entry(*element).or_default().extend(*attributes));
+    }
+    all
 }

@@ -1,5 +1,6 @@
-//! Whether what the model structure lists besides outputs is there, and whether the list of initial unknowns is that of the standards (FMI 2.0.4 §2.2.8, FMI 3.0.2 §2.4.8): outputs and calculated parameters that
-//! are not exact at the start, and continuous states and their derivatives likewise.
+//! Whether what the model structure lists besides outputs is there, and whether the list of initial unknowns is that of the standards
+//! (FMI 2.0.4 §2.2.8, FMI 3.0.2 §2.4.8): outputs and calculated parameters that are not exact at the start, and continuous states and
+//! their derivatives likewise.
 
 use super::element::Element;
 use super::model::{
@@ -17,14 +18,16 @@ const NAMED: usize = 5;
 pub fn defects(root: &Element, description: &ModelDescription) -> Vec<Defect> {
     let Some(structure) = root.child("ModelStructure") else { return Vec::new() };
     let listed: BTreeSet<usize> = description.initial_unknowns.iter().map(|u| u.variable).collect();
-    let wanted = wanted(&structure, description);
-    let line = structure.line();
     let lookup = Lookup::of(description);
+    let wanted = wanted(&structure, description, &lookup);
     let lost = listed_besides(&structure, description.version).filter_map(|e| lost(&e, &lookup));
     let lacks = message(description, wanted.difference(&listed), "is not listed", "are not listed");
     let extra =
         message(description, listed.difference(&wanted), "does not belong there", "do not belong there");
-    let defect = |message| Defect { kind: DefectKind::InitialUnknowns, line: Some(line), message };
+    let defect = |message| {
+        let line = Some(structure.line());
+        Defect { kind: DefectKind::InitialUnknowns, line, message }
+    };
     lost.chain(lacks.into_iter().chain(extra).map(defect)).collect()
 }
 
@@ -41,12 +44,15 @@ fn lost(element: &Element, lookup: &Lookup) -> Option<Defect> {
     let (key, name) = (lookup.key(), element.name());
     let number = element.text(key);
     let found = number.trim().parse().ok().and_then(|number| lookup.find(number));
-    let message = format!("<{name}> of ModelStructure: no variable has the {key} `{}`", printable(number));
-    found.is_none().then(|| Defect { kind: DefectKind::Structure, line: Some(element.line()), message })
+    found.is_none().then(|| Defect {
+        kind: DefectKind::Structure,
+        line: Some(element.line()),
+        message: format!("<{name}> of ModelStructure: no variable has the {key} `{}`", printable(number)),
+    })
 }
 
 /// Positions of the variables that are to be listed.
-fn wanted(structure: &Element, d: &ModelDescription) -> BTreeSet<usize> {
+fn wanted(structure: &Element, d: &ModelDescription, lookup: &Lookup) -> BTreeSet<usize> {
     let own = |v: &Variable| match v.causality {
         Causality::Output => v.value_type != ValueType::Clock && v.clocks.is_empty() && !is_exact(v),
         Causality::CalculatedParameter => true,
@@ -54,8 +60,7 @@ fn wanted(structure: &Element, d: &ModelDescription) -> BTreeSet<usize> {
     };
     let variables = d.variables.iter().enumerate().filter(|(_, v)| !v.alias);
     let mut all: BTreeSet<usize> = variables.filter(|(_, v)| own(v)).map(|(k, _)| k).collect();
-    let lookup = Lookup::of(d);
-    let derivatives = derivatives(structure, d.version, &lookup);
+    let derivatives = derivatives(structure, d.version, lookup);
     let states = derivatives.iter().filter_map(|k| lookup.find(d.variables[*k].derivative_of?));
     let unknown: Vec<usize> =
         states.chain(derivatives.iter().copied()).filter(|k| !is_exact(&d.variables[*k])).collect();

@@ -163,6 +163,7 @@ impl Keeper {
         (every_s, csv): (f64, bool),
     ) -> Result<Self> {
         let origin = Origin::of(scenario, options)?;
+        remove_parts(folder);
         Ok(Self { path: folder.join(CHECKPOINT), origin, every_s, csv, written_s: None })
     }
 
@@ -234,9 +235,31 @@ pub fn require_states(testbed: &Testbed) -> Result {
     Err(InputError::plain(message, Some(help.into())).into())
 }
 
+/// Removes what is left of a checkpoint in whose middle the program was killed.
+fn remove_parts(folder: &Path) {
+    let is_part = |name: &str| {
+        name.strip_prefix(CHECKPOINT).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(".part"))
+    };
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_str().is_some_and(is_part) {
+            drop(std::fs::remove_file(entry.path()));
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_of_checkpoints_alone_are_removed() {
+        let folder = tempfile::tempdir().expect("folder");
+        let names = ["checkpoint.bin", "checkpoint.bin.a1.part", "scan.part", "checkpoint.bin.old"];
+        names.iter().for_each(|name| std::fs::write(folder.path().join(name), "").expect("written"));
+        remove_parts(folder.path());
+        let left = names.map(|name| folder.path().join(name).exists());
+        assert_eq!(left, [true, false, true, true]);
+    }
 
     #[test]
     fn a_file_is_replaced_whole_or_stays() {
@@ -245,9 +268,30 @@ mod tests {
         replace(&path, b"first").expect("written");
         replace(&path, b"second").expect("written");
         assert_eq!(std::fs::read(&path).expect("there"), b"second");
-        // the part cannot be created: there is a folder in its place
-        std::fs::create_dir(path.with_extension("part")).expect("made");
-        assert!(replace(&path, b"third").is_err());
-        assert_eq!(std::fs::read(&path).expect("there"), b"second");
+        // it cannot be put in its place: there is a folder
+        let taken = folder.path().join("taken");
+        std::fs::create_dir_all(taken.join("inner")).expect("made");
+        assert!(replace(&taken, b"third").is_err());
+        assert!(replace(&folder.path().join("nowhere/checkpoint.bin"), b"third").is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).expect("there").count(), 2, "a part is left");
+    }
+
+    #[test]
+    fn a_file_that_several_write_at_once_is_whole() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("sweep.csv");
+        std::thread::scope(|scope| {
+            for writer in 0..4_u8 {
+                let path = &path;
+                scope.spawn(move || {
+                    for _ in 0..50 {
+                        replace(path, &[writer; 5000]).expect("written");
+                        let there = std::fs::read(path).expect("there");
+                        assert!(there.len() == 5000 && there.iter().all(|byte| *byte == there[0]));
+                    }
+                });
+            }
+        });
+        assert_eq!(std::fs::read_dir(folder.path()).expect("there").count(), 1, "a part is left");
     }
 }

@@ -1,8 +1,9 @@
 //! Names of the files in a results folder, and errors that carry them.
 
 use crate::space::RESERVE;
-use std::fs::File;
+use std::fs::Permissions;
 use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
 
@@ -52,19 +53,21 @@ pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
     Ok(())
 }
 
-/// Writes a file beside `path` and puts it in its place: at any moment there is one whole file.
+/// Writes a file beside `path` and puts it in its place: at any moment there is one whole file, also when several
+/// processes write it at once.
 ///
 /// # Errors
 /// The file cannot be written; what was there stays.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
-    let part = path.with_extension("part");
-    let written = File::create(&part).and_then(|mut file| {
-        file.write_all(content)?;
-        file.sync_data()
-    });
-    let replaced = written.and_then(|()| std::fs::rename(&part, path));
-    // a part of it is of no use
-    replaced.inspect_err(|_| drop(std::fs::remove_file(&part)))
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".");
+    let mut part = tempfile::Builder::new();
+    part.prefix(&name).suffix(".part").permissions(Permissions::from_mode(0o666));
+    let mut part = part.tempfile_in(folder)?;
+    part.write_all(content)?;
+    part.as_file().sync_data()?;
+    part.persist(path).map(drop).map_err(|error| error.error)
 }
 
 /// Says which file an input/output error is about.

@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 use terraglue_diagnostics::error::Result;
-use terraglue_recording::at;
 use terraglue_recording::report::figure::{Curve, Figure, Panel};
 use terraglue_recording::report::html::{escape, number};
 use terraglue_recording::report::page::Page;
+use terraglue_recording::{at, replace};
 
 /// Most values of a key that each have a mean of their own; more are gathered in groups of neighbours.
 const MOST_VALUES: usize = 25;
@@ -29,7 +29,7 @@ const MOST_FAILED: usize = 500;
 /// The file cannot be written.
 pub fn write(sweep: &Sweep, all: &Collected) -> Result<PathBuf> {
     let path = sweep.folder().join(PAGE);
-    std::fs::write(&path, render(all)).map_err(at(&path))?;
+    replace(&path, render(all).as_bytes()).map_err(at(&path))?;
     Ok(path)
 }
 

@@ -129,6 +129,9 @@ FAULTS = {
     "leaving": (["if step.t > 0.25: os._exit(4)"], ["exit code 4"]),
     "hanging": (["while step.t > 0.25: pass"], ["did not answer within 5 s", "mine.py", "advance"]),
     "sleeping": (["if step.t > 0.25: time.sleep(1000)"], ["did not answer within 5 s", "mine.py"]),
+    # as on a machine with much to do: it says where it hangs 1.5 s after it was asked
+    "stopped": (["if step.t > 0.25:", "    os.system(f'(sleep 6.5; kill -CONT {os.getpid()}) & kill -STOP {os.getpid()}')",
+                 "    time.sleep(1000)"], ["did not answer within 5 s", "mine.py"]),
 }
 
 

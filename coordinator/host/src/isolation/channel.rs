@@ -203,11 +203,12 @@ pub fn parent() -> i32 {
     unsafe { libc::getppid() }
 }
 
-/// Asks a worker in Python to write down where it stands.
+/// Asks a worker in Python to write down where its main thread stands, which makes the calls: a signal to the whole process
+/// may reach another one.
 pub fn ask(worker: u32) {
     if worker > 1 {
-        // SAFETY: a plain system call; the process is a child that was not waited for yet.
-        unsafe { libc::kill(worker as i32, libc::SIGUSR1) };
+        // SAFETY: a plain system call; the process is a child that was not waited for yet. Its main thread has its number.
+        unsafe { libc::syscall(libc::SYS_tgkill, worker, worker, libc::SIGUSR1) };
     }
 }
 

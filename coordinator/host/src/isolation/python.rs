@@ -28,6 +28,9 @@ pub(super) const TAKE_FILES: &str = "import sys; sys.path[:] = [sys.argv[1]] + [
 /// File with the messages of the interpreter itself: faults, and where a module hangs.
 const DIARY: &str = "stderr.txt";
 
+/// Longest wait for where a module hangs.
+const PATIENCE: Duration = Duration::from_secs(3);
+
 /// The command that serves the segment; None: this is no module in Python.
 pub fn command(what: &What, folder: &Path, segment: &str) -> io::Result<Option<Command>> {
     let (What::Python { python, .. } | What::Law { python, .. }) = what else { return Ok(None) };
@@ -42,19 +45,31 @@ pub fn command(what: &What, folder: &Path, segment: &str) -> io::Result<Option<C
     Ok(Some(command))
 }
 
-/// Asks a worker that does not answer where it stands, and gives it a moment to write that down.
+/// Asks a worker that does not answer where it stands, and gives it time to write that down: up to `PATIENCE` in which
+/// this process runs, so that a machine with much to do takes no answer away.
 pub fn ask_where(child: u32, folder: &Path) {
     super::channel::ask(child);
-    let end = Instant::now() + Duration::from_millis(500);
-    while Instant::now() < end && !last_words(folder).contains("File ") {
+    let (mut seen, mut looked) = (Duration::ZERO, Instant::now());
+    while seen < PATIENCE && !is_whole(&diary(folder)) {
         std::thread::sleep(Duration::from_millis(10));
+        let now = Instant::now();
+        seen += (now - looked).min(super::BLINK);
+        looked = now;
     }
+}
+
+/// Whether the list of calls, innermost first, has come to its end; the interpreter writes at most 100.
+fn is_whole(diary: &str) -> bool {
+    diary.lines().any(|line| line.ends_with(" in <module>") || line == "  ...")
+}
+
+fn diary(folder: &Path) -> String {
+    String::from_utf8_lossy(&std::fs::read(folder.join(DIARY)).unwrap_or_default()).into_owned()
 }
 
 /// The end of the interpreter's own messages.
 pub fn last_words(folder: &Path) -> String {
-    let text = std::fs::read(folder.join(DIARY)).unwrap_or_default();
-    let text = String::from_utf8_lossy(&text);
+    let text = diary(folder);
     let own = |line: &&str| {
         FILES.iter().all(|(name, _)| !line.contains(name)) && !line.contains("File \"<string>\"")
     };

@@ -21,6 +21,14 @@ def with_variable(folder, version, xml):
 
 
 V2 = '<ScalarVariable name="v" valueReference="7" causality="{}" variability="continuous"><Real {}/></ScalarVariable>'
+CLOCK = '<Clock name="c" valueReference="8" causality="output" intervalVariability="triggered"/>'
+
+
+def aliases(one, two):
+    """Two variables with one number in calls."""
+    return V2.format(*one) + V2.format(*two).replace('name="v"', 'name="w"')
+
+
 DEFECTS = [
     (2, V2.format("local", 'derivative="9"'), ["index 9", "does not exist"]),
     (2, V2.format("local", 'derivative="x"'), ["does not exist"]),
@@ -32,6 +40,18 @@ DEFECTS = [
     (3, '<Int32 name="v" valueReference="7" causality="input" start="0" max="99999999999"/>', ["99999999999", "Int32 cannot hold"]),
     (3, '<UInt8 name="v" valueReference="7" causality="input" start="0" min="-1"/>', ["min = -1", "UInt8 cannot hold"]),
     (3, '<Float32 name="v" valueReference="7" causality="input" start="1e50"/>', ["1e50", "Float32 cannot hold"]),
+    (2, V2.format("local", 'reinit="true"'), ["`v` has `reinit`", "no continuous state"]),
+    (3, '<Float64 name="v" valueReference="7" causality="local" reinit="false"/>', ["`v` has `reinit`", "no continuous state"]),
+    (2, V2.format("local", 'nominal="0"'), ['nominal = "0"']),
+    (3, '<Float32 name="v" valueReference="7" causality="local" nominal="INF"/>', ['nominal = "INF"']),
+    (3, '<Int32 name="v" valueReference="7" causality="local" previous="1"/>', ["`v` has `previous`", "no clock"]),
+    (3, f'{CLOCK}<Int32 name="v" valueReference="7" causality="local" clocks="8" previous="6"/>', ["valueReference 6", "does not exist"]),
+    (3, f'{CLOCK}<Int32 name="v" valueReference="7" causality="local" clocks="8" previous="7"/>', ["`v` is its own previous value"]),
+    (3, f'{CLOCK}<Int32 name="v" valueReference="7" causality="local" clocks="8" previous="1"/>', ["previous value in `y`", "same type"]),
+    (2, aliases(("local", 'start="1"'), ("local", 'start="2"')), ["`v` and `w`", "valueReference 7", "start values differ"]),
+    (2, aliases(("local", 'start="1"'), ("local", 'start="1"')), ["`v` and `w`", "both have a start value"]),
+    (2, aliases(("input", 'start="1"'), ("input", 'start="1"')), ["`v` and `w`", "both can be set"]),
+    (2, aliases(("local", 'unit="m"'), ("local", "")), ["`v` and `w`", "units differ"]),
 ]
 
 
@@ -50,6 +70,10 @@ def test_a_defect_is_told_with_its_line(tmp_path, version, xml, words):
     ("version", "xml"),
     [
         (2, V2.format("local", 'derivative="2"')),
+        (2, V2.format("local", 'reinit="true" start="1"') + V2.format("local", 'derivative="3"').replace('"v" valueReference="7"', '"w" valueReference="8"')),
+        (2, aliases(("local", 'start="1" nominal="-1e-9"'), ("local", ""))),
+        (3, f'{CLOCK}<Int32 name="p" valueReference="9" causality="local"/>'
+            '<Int32 name="v" valueReference="7" causality="local" clocks="8" previous="9"/>'),
         (3, '<Float64 name="v" valueReference="7" causality="local" derivative="1"/>'),
         (3, '<Clock name="c" valueReference="8" causality="output" intervalVariability="triggered"/>'
             '<Float64 name="v" valueReference="7" causality="input" variability="discrete" start="0" clocks="8"/>'),

@@ -1,5 +1,6 @@
 //! The model description of an FMU: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
+mod aliases;
 mod attributes;
 mod defects;
 mod details;
@@ -7,6 +8,7 @@ pub(crate) mod element;
 mod initial_unknowns;
 mod model;
 mod resize;
+mod states;
 mod structure;
 mod terminals;
 pub(crate) mod types;
@@ -82,6 +84,8 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
     structure::read(root, &mut description)?;
     description.details = attributes::defects(root, version);
     description.details.extend(details::defects(root, version, &description.experiment));
+    description.details.extend(states::defects(root, &description));
+    description.details.extend(aliases::defects(&description));
     description.details.extend(initial_unknowns::defects(root, &description));
     Ok(description)
 }

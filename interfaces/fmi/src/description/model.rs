@@ -384,6 +384,7 @@ pub enum DefectKind {
     DependencyKind,
     Experiment,
     Attribute,
+    Alias,
     InitialUnknowns,
 }
 

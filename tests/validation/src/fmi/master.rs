@@ -257,7 +257,7 @@ fn apart(place: &Path, context: &Context) -> Outcome<[Figure; 2]> {
 }
 
 /// Descriptions that are wrong in one place each: the words of a variable, and its name.
-const DEFECTS: [(&str, &str); 15] = [
+const DEFECTS: [(&str, &str); 18] = [
     (
         "enumeration",
         "<Enumeration name=\"v\" valueReference=\"1\" causality=\"parameter\" variability=\"fixed\" start=\"1\"/>",
@@ -297,6 +297,9 @@ const DEFECTS: [(&str, &str); 15] = [
         "role",
         "<Float64 name=\"v\" valueReference=\"1\" causality=\"parameter\" variability=\"continuous\" start=\"1\"/>",
     ),
+    ("reinit", "<Float64 name=\"v\" valueReference=\"1\" causality=\"local\" reinit=\"true\"/>"),
+    ("nominal", "<Float64 name=\"v\" valueReference=\"1\" causality=\"local\" nominal=\"0\"/>"),
+    ("previous", "<Int32 name=\"v\" valueReference=\"1\" causality=\"local\" previous=\"2\"/>"),
 ];
 
 fn defects(place: &Path) -> Outcome<Figure> {

@@ -35,6 +35,12 @@ impl Call {
     pub fn of(number: u8) -> Option<Self> {
         Self::ALL.iter().copied().find(|c| *c as u8 == number)
     }
+
+    /// Whether it comes at most about once in a step.
+    pub fn is_rare(self) -> bool {
+        use Call::{Act, Advance, AdvanceBatch, Commit, Quit, Start};
+        matches!(self, Start | Advance | AdvanceBatch | Commit | Act | Quit)
+    }
 }
 
 /// Writes the log of the instance and the outcome of the call; an answer follows where it succeeded.

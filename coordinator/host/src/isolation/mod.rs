@@ -11,6 +11,7 @@ mod channel;
 mod fork_server;
 mod law;
 mod messages;
+mod printed;
 mod proxy;
 mod python;
 mod sight;
@@ -188,11 +189,15 @@ fn spawn(what: &What, folder: &Path, segment: &str) -> Result<(WorkerProcess, bo
         Some(command) => command,
         None => {
             let mut command = Command::new(program()?);
-            command.args(["worker", segment]).stdin(Stdio::null()).stderr(Stdio::null());
+            let file = || printed::file(folder).map_err(|e| failed("no file for its output", &e));
+            command.args(["worker", segment]).stdin(Stdio::null()).stdout(file()?).stderr(file()?);
             command
         }
     };
-    command.env("TMPDIR", folder).stdout(Stdio::null()).process_group(0);
+    if is_python {
+        command.stdout(Stdio::null());
+    }
+    command.env("TMPDIR", folder).process_group(0);
     let child = command.spawn().map_err(|e| match what {
         What::Python { python, .. } | What::Law { python, .. } => {
             Error::Refused(python::not_started(python, &e))
@@ -294,7 +299,8 @@ impl Link {
     #[cold]
     fn lose(&mut self, why: String) -> Error {
         self.child.end();
-        let said = if self.is_python { python::last_words(self.folder.path()) } else { String::new() };
+        let last_words = if self.is_python { python::last_words } else { printed::last_words };
+        let said = last_words(self.folder.path());
         let why = format!("its process was lost: {why}{said}");
         self.gone = Some(why.clone());
         Error::Fatal(why)

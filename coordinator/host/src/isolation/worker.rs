@@ -3,6 +3,7 @@
 use super::calls::{self, Call, OwnedStep};
 use super::channel::{self, Segment};
 use super::messages::Messages;
+use super::printed::Printed;
 use super::proxy::ModuleInfo;
 use super::sight;
 use super::tiles::Tiles;
@@ -33,7 +34,8 @@ pub fn serve(path: &Path, library: &Library) -> ExitCode {
     });
     let Ok(segment) = Segment::open(path) else { return ExitCode::FAILURE };
     let channel = WorkerChannel::new(segment);
-    let mut worker = Worker { library: library.clone(), ..Worker::default() };
+    let printed = Printed::of_this_process();
+    let mut worker = Worker { library: library.clone(), printed, ..Worker::default() };
     loop {
         let request = channel.next(&worker.log.cancel);
         let quits = request.first() == Some(&(Call::Quit as u8));
@@ -81,6 +83,7 @@ impl Log {
 struct Worker {
     library: Library,
     log: Arc<Log>,
+    printed: Printed,
     subsystem: Option<Box<dyn Subsystem>>,
     is_module: bool,
     tiles: Tiles,
@@ -114,6 +117,9 @@ impl Worker {
             },
             Some(call) => self.call(call, &mut r, &mut body),
         };
+        if call.is_none_or(Call::is_rare) {
+            self.printed.take(|line| self.log.put(LogLevel::Info, line));
+        }
         let mut segment = channel.segment.borrow_mut();
         let area = segment.area(1);
         let mut w = Writer::new(area);

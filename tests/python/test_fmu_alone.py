@@ -64,6 +64,22 @@ def test_a_crash_at_the_end_loses_no_row(tmp_path):
         assert (tmp_path / "rows.csv").read_text().splitlines()[-1].startswith("1,1")
 
 
+def test_an_fmu_that_crashes_while_it_saves_its_state_runs_without(tmp_path):
+    more = "int fmi2GetFMUstate(Fmu *u, void **s) { *(volatile int *)0 = 1; return 0; }"
+    fmu = cfmu.build(tmp_path, "crashes", REALS, COUNTS, more=more, instead=["fmi2GetFMUstate"])
+    crashed = run(fmu)
+    assert crashed.returncode not in (0, 1, 2) and "--no-rollback" in crashed.stderr, crashed.stderr
+    ended = run(fmu, "--no-rollback")
+    assert ended.returncode == 0 and ended.stdout.splitlines()[-1].startswith("1,1"), ended.stderr
+    scenario = tmp_path / "one.toml"
+    text = f'[time]\nduration_s = 1.0\nstep_s = 0.1\n[one]\nfmu = "{fmu.name}"\n'
+    scenario.write_text(text)
+    assert "`rollback = false`" in terraglue("run", scenario, "--quiet").stderr
+    scenario.write_text(text + "rollback = false\n")
+    ended = terraglue("run", scenario, "--quiet")
+    assert ended.returncode == 0, ended.stderr
+
+
 def test_rows_are_the_same_apart_and_each_is_written_once(tmp_path):
     fmu = cfmu.build(tmp_path, "counts", REALS, COUNTS)
     whole = terraglue("fmu", "run", fmu, "--stop", "10", "--step", "0.001")
@@ -79,6 +95,31 @@ def test_output_of_an_fmu_stands_apart_from_its_rows_and_has_a_bound(tmp_path):
     assert ended.returncode == 0
     assert len(ended.stdout.splitlines()) == 12 and "floods" not in ended.stdout
     assert len(ended.stderr) < 3 << 20 and "the rest is left out" in ended.stderr
+
+
+def isolated(fmu, folder):
+    (folder / "one.toml").write_text(f'[time]\nduration_s = 1.0\nstep_s = 0.1\n[one]\nfmu = "{fmu}"\nisolate = true\n')
+    return terraglue("run", folder / "one.toml", "--out", folder / "out")
+
+
+def test_lines_that_an_isolated_fmu_of_a_scenario_prints_are_logged(tmp_path, monkeypatch):
+    monkeypatch.setenv("TERRAGLUE_LOG", "info")
+    step = f'printf("from %g", t); puts(" s"); fputs("aside\\n", stderr); {COUNTS}'
+    ended = isolated(cfmu.build(tmp_path, "tells", REALS, step, more="#include <stdio.h>\n"), tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    told = [line for line in ended.stderr.splitlines() if "one: " in line]
+    assert sum("one: aside" in line for line in told) == 10
+    assert [f"one: from {t:g} s" in "\n".join(told) for t in (0.0, 0.1, 0.9)] == [True] * 3, ended.stderr
+    assert "from" not in ended.stdout
+    flood = f'for (int k = 0; k < 20000; k++) puts("floods the output of whoever runs it"); {COUNTS}'
+    ended = isolated(cfmu.build(tmp_path, "floods", REALS, flood, more="#include <stdio.h>\n"), tmp_path)
+    assert ended.returncode == 0 and ended.stderr.count("the rest is left out") == 1 and len(ended.stderr) < 3 << 20
+
+
+def test_an_isolated_fmu_that_crashes_has_last_words(tmp_path):
+    step = f'if (t > 0.45) {{ puts("no valve is open"); *(volatile int *)0 = 1; }} {COUNTS}'
+    ended = isolated(cfmu.build(tmp_path, "crashes", REALS, step, more="#include <stdio.h>\n"), tmp_path)
+    assert ended.returncode == 1 and "segmentation fault" in ended.stderr and "no valve is open" in ended.stderr, ended.stderr
 
 
 def test_a_step_that_hangs_is_ended_and_the_way_out_named(tmp_path):

@@ -625,6 +625,9 @@ pub struct FmuRunArguments {
     /// Hold inputs over each step, also of FMUs that can follow them within (FMI 3: intermediate update; FMI 2: canInterpolateInputs).
     #[arg(long)]
     pub hold_inputs: bool,
+    /// Do not save the state of the FMU before a step: one that the FMU discards cannot be halved then.
+    #[arg(long)]
+    pub no_rollback: bool,
     /// Write what the FMU shows at its inner steps here (FMI 3, intermediate update).
     #[arg(long, value_name = "FILE")]
     pub intermediate: Option<PathBuf>,

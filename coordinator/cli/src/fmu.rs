@@ -124,6 +124,7 @@ fn settings(arguments: &FmuRunArguments) -> Result<Settings> {
             .unwrap_or_default()
             .into(),
         hold_inputs: arguments.hold_inputs,
+        no_rollback: arguments.no_rollback,
         log_categories: arguments.log_categories.clone(),
         strict: arguments.strict,
         trace: arguments.trace.as_deref().map(traced).transpose()?,

@@ -35,6 +35,8 @@ pub struct Settings {
     pub input: Arc<Table>,
     /// Whether inputs are held over each step, also of FMUs that follow them within.
     pub hold_inputs: bool,
+    /// Whether the state of the FMU is not saved before a step, so that none is made again in halves.
+    pub no_rollback: bool,
     /// Categories of the log that are switched on.
     pub log_categories: Vec<String>,
     /// Whether defects of the description are errors.
@@ -136,7 +138,8 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     let values = Row { columns: &columns, on_nan: settings.on_nan, warned: Cell::new(false) };
     row(&marked(header(&columns), 0))?;
     row(&marked(values.at(&instance, start)?, 0))?;
-    let mut before = Before { state: FmuState::default(), saves: description.capabilities.state };
+    let mut before =
+        Before { state: FmuState::default(), saves: description.capabilities.state && !settings.no_rollback };
     let mut ended = None;
     let outcome = (0..steps as u64).try_for_each(|k| {
         if ended.is_some() {

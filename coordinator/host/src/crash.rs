@@ -182,13 +182,18 @@ fn report(index: usize, names: &Names, call: &LastCall) {
     }
     if call.function == RUN {
         put(
-            ".\n  help: --isolate keeps it in a process of its own: its crash is an error then, and the rows are complete\n",
+            ".\n  help: --isolate keeps it in a process of its own: its crash is an error then, and the rows are complete; \
+             --no-rollback runs an FMU that crashes while it saves its state\n",
         );
         return;
     }
     put(".\n  help: `isolate = true` in [");
     put(&names.instance);
-    put("] keeps it in a process of its own: its crash is an error then, and the recording is closed\n");
+    put("] keeps it in a process of its own: its crash is an error then, and the recording is closed");
+    if names.module.ends_with(".fmu") {
+        put("; `rollback = false` runs an FMU that crashes while it saves its state");
+    }
+    put("\n");
 }
 
 fn put(text: &str) {

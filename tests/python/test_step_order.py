@@ -121,6 +121,21 @@ def test_a_loop_whose_values_run_away_is_not_solved(tmp_path):
     assert done.returncode == 1 and "the loop of a, b was not solved" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("key", "fault", "line", "words"),
+    [
+        ("rollback = false", "", 4, "`mass` cannot save its state"),
+        ("", '[[fault]]\nvariable = "mass.x"\nkind = "gain"\nvalue = 2.0\nat_s = 0.05\n', 18, "a fault changes mass.x → a_spring.x"),
+    ],
+)
+def test_a_loop_that_cannot_be_iterated_names_its_place(parts, tmp_path, key, fault, line, words):
+    connections = "".join(f'[[connect]]\nfrom = "{a}"\nto = "{b}"\norder = "iterate"\n' for a, b in [("mass.x", "a_spring.x"), ("a_spring.f", "mass.f")])
+    fmus = f'[mass]\nfmu = "{parts}/mass.fmu"\n{key}\n[a_spring]\nfmu = "{parts}/spring.fmu"\n'
+    (tmp_path / "s.toml").write_text("[time]\nstep_s = 0.01\nduration_s = 0.1\n" + fmus + connections + fault)
+    done = terraglue("run", "s.toml", "--quiet", cwd=tmp_path)
+    assert done.returncode == 2 and words in done.stderr and f"s.toml:{line}:" in done.stderr, done.stderr
+
+
 def iterated(parts, folder, step, order="iterate", more=""):
     """Energies over 2 s, and the largest error of the position relative to the amplitude, with the loop of mass and spring solved in
     each step."""

@@ -123,9 +123,9 @@ impl Faults {
         Ok(Self { all: specs.iter().enumerate().map(one).collect::<std::result::Result<_, _>>()? })
     }
 
-    /// Whether one changes numbers of a connection.
-    pub fn change(&self, link: usize) -> bool {
-        self.all.iter().any(|fault| fault.places.entries.iter().any(|entry| entry.link == link))
+    /// The first that changes numbers of a connection, by its place in the scenario.
+    pub fn that_changes(&self, link: usize) -> Option<usize> {
+        self.all.iter().position(|fault| fault.places.entries.iter().any(|entry| entry.link == link))
     }
 
     /// Whether there are none.

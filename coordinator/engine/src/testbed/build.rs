@@ -4,7 +4,7 @@ use super::checks::{check_groups, check_report};
 use super::declared_glue::{body_states, declared};
 use super::glued::GluedGroups;
 use super::group::Group;
-use super::loops::{Loops, NO_LOOP, open_loops};
+use super::loops::{LoopRefusal, Loops, NO_LOOP, open_loops};
 use super::pieces;
 use super::run_clock::RunClock;
 use super::schedule::StepSchedule;
@@ -95,7 +95,7 @@ impl Testbed {
         }
         let streams = Streams::new(&subsystems.instances);
         let Subsystems { instances, schedules, .. } = &mut subsystems;
-        let (order, loops) = order(&mut signals, instances, schedules, services.slots - 1)?;
+        let (order, loops) = order(scenario, &mut signals, instances, schedules, services.slots - 1)?;
         Ok(Self {
             exact: takes_parts(scenario, &subsystems.instances),
             subsystems,
@@ -121,6 +121,7 @@ impl Testbed {
 
 /// The order of the steps, and the loops in it; `state`: number of a state that nobody else keeps.
 fn order(
+    scenario: &Scenario,
     signals: &mut Signals,
     instances: &[Instance],
     schedules: &mut [StepSchedule],
@@ -131,7 +132,7 @@ fn order(
     links.settle_ends(&feed_through);
     let mut order = StepOrder::new(links, faults, &feed_through, instances, schedules);
     let loops = Loops::new(links, faults, &feed_through, instances, schedules, state)
-        .map_err(|message| InputError::plain(message, Some(NO_LOOP.into())))?;
+        .map_err(|refusal| loop_error(scenario, instances, refusal))?;
     order.put_behind_loops(loops.followers(), links, instances, schedules);
     open_loops(links, instances).iter().for_each(|warning| log::warn!("{warning}"));
     Ok((order, loops))
@@ -439,6 +440,17 @@ fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) ->
             source.error_about(name, &[name], error.to_string(), help)
         }
         _ => source.error_at_value(&[name, "module"], error.to_string(), help),
+    }
+}
+
+fn loop_error(scenario: &Scenario, instances: &[Instance], refusal: LoopRefusal) -> Box<InputError> {
+    let (source, help) = (&scenario.source, Some(NO_LOOP.to_owned()));
+    match refusal {
+        LoopRefusal::Subsystem(slot, message) => source.error_of_table(instances[slot].name(), message, help),
+        LoopRefusal::Fault(number, message) => {
+            let spec = &scenario.faults[number];
+            source.error_in(spec.entry, &[&spec.variable], message, help)
+        }
     }
 }
 

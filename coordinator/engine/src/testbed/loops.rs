@@ -28,6 +28,12 @@ const MOST: u32 = 60;
 pub(super) const NO_LOOP: &str =
     "leave `order = \"iterate\"` of its connections out: then values of a loop are late by a step";
 
+/// Why a loop cannot be iterated: the subsystem or the fault that hinders, by its number, and why.
+pub(super) enum LoopRefusal {
+    Subsystem(usize, String),
+    Fault(usize, String),
+}
+
 /// All loops of a run.
 #[derive(Debug, Default)]
 pub(super) struct Loops {
@@ -44,7 +50,7 @@ impl Loops {
     /// The loops of a run; `state`: number of a state that nobody else keeps.
     ///
     /// # Errors
-    /// A subsystem that takes part and cannot repeat a step, in words.
+    /// A subsystem that takes part and cannot repeat a step, or a fault that changes a value of a loop.
     pub fn new(
         links: &Links,
         faults: &Faults,
@@ -52,7 +58,7 @@ impl Loops {
         instances: &[Instance],
         schedules: &[StepSchedule],
         state: u32,
-    ) -> std::result::Result<Self, String> {
+    ) -> std::result::Result<Self, LoopRefusal> {
         let mut loops = Self { state, ..Self::default() };
         let edges = edges(links, instances);
         loops.find_members(links, &edges, instances.len());
@@ -60,18 +66,18 @@ impl Loops {
         for slot in &loops.members {
             let (instance, schedule) = (&instances[*slot], &schedules[*slot]);
             if let Some(why) = cannot_repeat(instance, schedule) {
-                return Err(format!(
-                    "`{}` {why}: it cannot take part in a loop that is iterated",
-                    instance.name()
-                ));
+                let name = instance.name();
+                let message = format!("`{name}` {why}: it cannot take part in a loop that is iterated");
+                return Err(LoopRefusal::Subsystem(*slot, message));
             }
         }
         let numbers = links.numbers.iter().enumerate().filter(|(_, link)| link.is_iterated());
         let mut iterated: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (k, link) in numbers {
-            if faults.change(k) {
+            if let Some(fault) = faults.that_changes(k) {
                 let names = link.names(instances);
-                return Err(format!("a fault changes {}: it cannot be iterated", names.join(", ")));
+                let message = format!("a fault changes {}: it cannot be iterated", names.join(", "));
+                return Err(LoopRefusal::Fault(fault, message));
             }
             iterated.entry(component[link.slots()[1]]).or_default().push(k);
         }

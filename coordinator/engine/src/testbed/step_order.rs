@@ -137,7 +137,8 @@ fn candidates(
     };
     let within = |[from, to]: [usize; 2]| from != to && orderly(from) && orderly(to);
     let numbers = links.numbers.iter().enumerate();
-    let numbers = numbers.filter(|(k, l)| l.is_ordered() && within(l.slots()) && !faults.change(*k));
+    let numbers =
+        numbers.filter(|(k, l)| l.is_ordered() && within(l.slots()) && faults.that_changes(*k).is_none());
     let numbers = numbers.flat_map(|(k, link)| {
         link.ends().map(move |(ends, _)| ConnectedValue { connection: Place::Number(k), ends })
     });

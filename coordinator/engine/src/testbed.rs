@@ -10,6 +10,7 @@ use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_gluing::timing::{Part, Timings};
 use terraglue_gluing::{Outcome, StepReport};
@@ -275,7 +276,7 @@ impl Testbed {
             self.sight.before_commit(&self.subsystems);
             uncoupled::commit(&self.clock, (h, end), &mut self.subsystems)?;
             self.subsystems.read_states()?;
-            self.sight.after_commit(&self.clock, (h, end), &mut self.subsystems)?;
+            self.sight.after_commit(&self.clock, (h, end), &mut self.subsystems, &mut self.timings)?;
             self.streams.collect(&self.subsystems.instances, |stream, bytes| {
                 self.signals.links.feed(stream, bytes)
             })?;
@@ -293,6 +294,7 @@ impl Testbed {
     pub fn run_until(&mut self, until_s: f64, observers: &mut [&mut dyn Observer]) -> Result {
         while self.clock.is_before(until_s) && !self.cancelled() {
             let stepped = self.step();
+            let start = Instant::now();
             for event in self.events.drain(..) {
                 for observer in observers.iter_mut() {
                     observer.event(&event)?;
@@ -300,6 +302,7 @@ impl Testbed {
             }
             stepped?;
             self.view(|view| observers.iter_mut().try_for_each(|o| o.stepped(view)))?;
+            self.timings.charge(Part::Observers, start);
         }
         Ok(())
     }

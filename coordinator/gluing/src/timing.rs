@@ -26,11 +26,17 @@ pub enum Part {
     CommitBodies,
     /// `commit` of the grounds (step 5): where material moves.
     CommitGrounds,
+    /// The world takes over what has moved, for those that see it.
+    World,
+    /// `observe` of all that see, with their rays.
+    Observe,
+    /// Observers of the run: the recording.
+    Observers,
 }
 
 impl Part {
     /// All parts with their names in tables.
-    pub const ALL: [(Self, &'static str); 10] = [
+    pub const ALL: [(Self, &'static str); 13] = [
         (Self::Signals, "signals"),
         (Self::Uncoupled, "unglued"),
         (Self::Contact, "contact"),
@@ -41,6 +47,9 @@ impl Part {
         (Self::Jacobian, "jacobian"),
         (Self::CommitBodies, "commit_bodies"),
         (Self::CommitGrounds, "commit_grounds"),
+        (Self::World, "world"),
+        (Self::Observe, "observe"),
+        (Self::Observers, "observers"),
     ];
 }
 

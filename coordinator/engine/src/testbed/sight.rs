@@ -8,8 +8,9 @@ use super::shown::Shown;
 use super::subsystems::Subsystems;
 use super::uncoupled::span;
 use std::sync::Arc;
-
+use std::time::Instant;
 use terraglue_diagnostics::{Error, InputError, Result, did_you_mean};
+use terraglue_gluing::timing::{Part, Timings};
 use terraglue_host::{Instance, Workers, observe, shape_visibility};
 use terraglue_scenario::{Scenario, SubsystemSpec};
 use terraglue_subsystem::{BodyState, Capabilities, Mount, Step};
@@ -90,10 +91,11 @@ impl Sight {
         clock: &RunClock,
         (h, end): (f64, f64),
         subsystems: &mut Subsystems,
+        timings: &mut Timings,
     ) -> Result {
         match &mut self.open {
             None => Ok(()),
-            Some(open) => open.show(&span(clock, h, end), subsystems),
+            Some(open) => open.show(&span(clock, h, end), subsystems, timings),
         }
     }
 
@@ -109,16 +111,21 @@ impl Sight {
 }
 
 impl Open {
-    fn show(&mut self, span: &Span, subsystems: &mut Subsystems) -> Result {
+    fn show(&mut self, span: &Span, subsystems: &mut Subsystems, timings: &mut Timings) -> Result {
         let Subsystems { schedules, .. } = &*subsystems;
         if !self.seers.iter().any(|slot| schedules[*slot].step_of(span).is_some()) {
             return Ok(());
         }
+        let start = Instant::now();
         self.update([span.step.t, span.step.t + span.step.h], subsystems)?;
-        let Subsystems { instances, schedules, .. } = subsystems;
+        timings.charge(Part::World, start);
+        let Subsystems { instances, schedules, members } = subsystems;
         for slot in &self.seers {
             if let Some(step) = schedules[*slot].step_of(span) {
+                let start = Instant::now();
                 look(&self.world, instances, *slot, &step)?;
+                timings.charge(Part::Observe, start);
+                members[*slot].cost += start.elapsed();
             }
         }
         Ok(())

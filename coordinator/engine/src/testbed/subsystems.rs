@@ -14,7 +14,7 @@ const RESTART: &str = "energy.restart";
 pub(super) struct Member {
     /// Committed states of its bodies.
     pub states: Vec<BodyState>,
-    /// CPU cost of its trials without glue, sampled, s.
+    /// Cost of its trials without glue, sampled, and of what it observes, s.
     pub cost: Duration,
 }
 

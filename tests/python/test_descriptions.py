@@ -51,6 +51,8 @@ DEFECTS = [
     (2, aliases(("local", 'start="1"'), ("local", 'start="2"')), ["`v` and `w`", "valueReference 7", "start values differ"]),
     (2, aliases(("local", 'start="1"'), ("local", 'start="1"')), ["`v` and `w`", "both have a start value"]),
     (2, aliases(("input", 'start="1"'), ("input", 'start="1"')), ["`v` and `w`", "both can be set"]),
+    (2, V2.format("local", 'start="1"'), ["`v` has a start value", "no `initial`"]),
+    (3, '<Float64 name="v" valueReference="7" causality="input" start="0" min="NaN"/>', ["min = NaN"]),
     (2, aliases(("local", 'unit="m"'), ("local", "")), ["`v` and `w`", "units differ"]),
 ]
 
@@ -70,8 +72,8 @@ def test_a_defect_is_told_with_its_line(tmp_path, version, xml, words):
     ("version", "xml"),
     [
         (2, V2.format("local", 'derivative="2"')),
-        (2, V2.format("local", 'reinit="true" start="1"') + V2.format("local", 'derivative="3"').replace('"v" valueReference="7"', '"w" valueReference="8"')),
-        (2, aliases(("local", 'start="1" nominal="-1e-9"'), ("local", ""))),
+        (2, V2.format('local" initial="exact', 'reinit="true" start="1"') + V2.format("local", 'derivative="3"').replace('"v" valueReference="7"', '"w" valueReference="8"')),
+        (2, aliases(('local" initial="exact', 'start="1" nominal="-1e-9"'), ("local", ""))),
         (3, f'{CLOCK}<Int32 name="p" valueReference="9" causality="local"/>'
             '<Int32 name="v" valueReference="7" causality="local" clocks="8" previous="9"/>'),
         (3, '<Float64 name="v" valueReference="7" causality="local" derivative="1"/>'),
@@ -79,6 +81,7 @@ def test_a_defect_is_told_with_its_line(tmp_path, version, xml, words):
             '<Float64 name="v" valueReference="7" causality="input" variability="discrete" start="0" clocks="8"/>'),
         (3, '<Int32 name="v" valueReference="7" causality="input" start="0" min="-2147483648" max="2147483647"/>'),
         (3, '<UInt64 name="v" valueReference="7" causality="input" start="0" max="18446744073709551615"/>'),
+        (3, '<UInt64 name="v" valueReference="7" causality="input" start="0" initial="exact"/>'),
         (3, '<Float32 name="v" valueReference="7" causality="input" start="3.4028235e38"/>'),
     ],
 )

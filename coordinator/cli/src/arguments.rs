@@ -669,11 +669,11 @@ pub struct FmuRunArguments {
     #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = positive, allow_negative_numbers = true)]
     pub timeout: f64,
     /// Most memory where it is isolated, MiB.
-    #[arg(long, value_name = "MIB", default_value_t = 8192)]
+    #[arg(long, value_name = "MIB", default_value_t = 8192, value_parser = clap::value_parser!(u64).range(16..=1_000_000_000))]
     pub memory_mb: u64,
     /// Handle events in event mode (FMI 3).
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, default_value = "off",
-          value_parser = clap::builder::BoolishValueParser::new())]
+          value_parser = clap::builder::BoolishValueParser::new(), hide_possible_values = true)]
     pub event_mode: bool,
 }
 

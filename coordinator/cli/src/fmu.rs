@@ -178,7 +178,8 @@ fn level(line: &terraglue_fmi::LogLine) -> log::Level {
 /// Lists what is wrong with an FMU; with a share also how far it is from the results that it brings with it, and whether that is more.
 fn check(fmu: &Path, within: Option<f64>) -> Result<Exit> {
     let (d, entries) = Fmu::inspect(fmu).map_err(input)?;
-    let problems = problems(&d, &entries);
+    let mut problems = problems(&d, &entries);
+    problems.extend(Fmu::library_defect(fmu, &d).map_err(input)?);
     for problem in &problems {
         outln!("{problem}");
     }

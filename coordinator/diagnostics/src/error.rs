@@ -71,6 +71,9 @@ pub enum Error {
     },
 }
 
+/// Words of an error of a module in a process of its own that is gone.
+pub const LOST: &str = "its process was lost";
+
 /// A time without the rounding of steps that were added up: 0.172 and not 0.17200000000000001.
 fn nanosecond(t_s: f64) -> f64 {
     (t_s * 1e9).round() / 1e9
@@ -92,8 +95,17 @@ impl Error {
                 PermissionDenied => "look at the permissions of the file and of its folder",
                 _ => "look at the file and at its folder, or name another one",
             }),
-            Self::Module { .. } => {
-                Some("`terraglue check-module` puts a module to the test, `isolate = true` keeps it apart")
+            Self::Module { module, message, .. } => {
+                Some(match (module.ends_with(".fmu"), message.contains(LOST)) {
+                    (false, false) => {
+                        "`terraglue check-module` puts a module to the test, `isolate = true` keeps it apart"
+                    }
+                    (false, true) => "`terraglue check-module` puts a module to the test",
+                    (true, false) => {
+                        "`trace = \"calls.txt\"` in the table of an FMU writes down its calls, `isolate = true` keeps it apart"
+                    }
+                    (true, true) => "`trace = \"calls.txt\"` in the table of an FMU writes down its calls",
+                })
             }
             _ => None,
         }

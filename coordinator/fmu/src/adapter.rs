@@ -1,7 +1,7 @@
 //! An FMU as a subsystem: trials by its saved states, values by name, every error with the messages of the FMU.
 
 mod elements;
-mod opening;
+pub(crate) mod opening;
 
 use super::array_starts::ArrayStarts;
 use super::bodies::{Axis, Bodies, terminals};
@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::sync::Arc;
-use terraglue_fmi::description::ModelDescription;
+use terraglue_fmi::description::{ModelDescription, hexadecimal};
 use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, FmuState, Stepped};
 use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
@@ -189,7 +189,11 @@ impl FmuSubsystem {
             ValueType::U16 => narrow!(U16),
             ValueType::U32 => narrow!(U32),
             ValueType::U64 => self.set(&id, Values::U64(&[value.as_u64().ok_or_else(wrong)?])),
-            ValueType::Binary | ValueType::Clock => Err(wrong()),
+            ValueType::Binary => {
+                let bytes = value.as_str().and_then(hexadecimal).ok_or_else(wrong)?;
+                self.set(&id, Values::Binary(&[bytes]))
+            }
+            ValueType::Clock => Err(wrong()),
         }
     }
 

@@ -5,8 +5,8 @@ use super::limits;
 use super::map::{effect, element_name, find};
 use super::table::Table;
 use std::sync::Arc;
-use terraglue_fmi::description::Variable;
-use terraglue_fmi::{Error, FmuInstance, ForeignInstance, ModelDescription, Result, Version};
+use terraglue_fmi::description::{Variability, Variable, hexadecimal};
+use terraglue_fmi::{Error, FmuInstance, ModelDescription, Result, Version};
 use terraglue_subsystem::{Effect, ValueType, Values};
 
 /// All that a table feeds.
@@ -186,7 +186,9 @@ impl Input {
         }
         if instance.clocks().waits_for_clock(v.reference) {
             let (v, cell) = (v.clone(), table.cell(t, column).to_owned());
-            instance.clocks_mut().hold(v.reference, move |instance| set_text(instance, &v, &cell));
+            instance.clocks_mut().hold(v.reference, move |instance| {
+                set_text(|references, values| instance.set(references, values), &v, &cell)
+            });
             return Ok(());
         }
         match v.value_type {
@@ -195,14 +197,17 @@ impl Input {
                 let narrow: Vec<f32> = self.numbers(table, t)?.into_iter().map(|x| x as f32).collect();
                 instance.set(&reference, Values::F32(&narrow))
             }
-            _ => set_text(instance.foreign(), v, table.cell(t, column)),
+            _ => set_text(|references, values| instance.set(references, values), v, table.cell(t, column)),
         }
     }
 
     fn numbers(&self, table: &Table, t: f64) -> Result<Vec<f64>> {
         let mut out = self.rest.clone();
         for (column, element) in &self.columns {
-            table.write(t, *column, *element, &mut out);
+            match self.variable.variability {
+                Variability::Discrete => hold(table.cell(t, *column), *element, &mut out),
+                _ => table.write(t, *column, *element, &mut out),
+            }
             let written = element.map_or(&out[..], |k| &out[k..=k]);
             if written.iter().any(|x| !x.is_finite()) {
                 return Err(match written.len() {
@@ -218,23 +223,33 @@ impl Input {
     }
 }
 
+/// Writes the numbers of a cell into a variable, or the one of an element: a discrete variable has nothing between two rows.
+fn hold(cell: &str, element: Option<usize>, out: &mut [f64]) {
+    let mut words = cell.split_whitespace().map(|word| word.parse().unwrap_or(f64::NAN));
+    let place = element.map_or(0..out.len(), |k| k..k + 1);
+    out[place].iter_mut().for_each(|x| *x = words.next().unwrap_or(f64::NAN));
+    if words.next().is_some() {
+        out.fill(f64::NAN);
+    }
+}
+
 /// Sets a variable from text; arrays take their elements separated by spaces.
 ///
 /// # Errors
 /// [`Error::WrongInput`]: no values of its type, or not so many.
-pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result {
+pub fn set_text(set: impl Fn(&[u32], Values) -> Result, v: &Variable, text: &str) -> Result {
     let wrong = || Error::WrongInput(format!("`{}` = {text}: it takes {}", v.name, limits::kind(v)));
     let words: Vec<&str> = text.split_whitespace().collect();
     macro_rules! parsed {
         ($variant:ident, $t:ty) => {{
             let values: Option<Vec<$t>> = words.iter().map(|w| w.parse().ok()).collect();
             let values = values.filter(|x| x.len() == v.len()).ok_or_else(wrong)?;
-            instance.set(&[v.reference], Values::$variant(&values))
+            set(&[v.reference], Values::$variant(&values))
         }};
     }
     match v.value_type {
         ValueType::F64 => parsed!(F64, f64),
-        ValueType::F32 => parsed!(F32, f32),
+        ValueType::F32 if words.iter().all(|w| w.parse().is_ok_and(f32::is_finite)) => parsed!(F32, f32),
         ValueType::I8 => parsed!(I8, i8),
         ValueType::I16 => parsed!(I16, i16),
         ValueType::I32 => parsed!(I32, i32),
@@ -251,7 +266,7 @@ pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result 
             let items =
                 items.filter(|all| all.len() == v.len() && all.iter().all(|n| limits::is_item(v, *n)));
             let none = || Error::WrongInput(format!("`{}` = {text}: {}", v.name, limits::items(v)));
-            instance.set(&[v.reference], Values::Enumeration(&items.ok_or_else(none)?))
+            set(&[v.reference], Values::Enumeration(&items.ok_or_else(none)?))
         }
         ValueType::Bool => {
             let value = match text {
@@ -259,9 +274,18 @@ pub fn set_text(instance: &ForeignInstance, v: &Variable, text: &str) -> Result 
                 "false" | "0" => false,
                 _ => return Err(wrong()),
             };
-            instance.set(&[v.reference], Values::Bool(&[value]))
+            set(&[v.reference], Values::Bool(&[value]))
         }
-        ValueType::String => instance.set(&[v.reference], Values::String(&[text.to_owned()])),
-        ValueType::Binary | ValueType::Clock => Err(wrong()),
+        ValueType::String => set(&[v.reference], Values::String(&[text.to_owned()])),
+        ValueType::Binary => {
+            let rows: Option<Vec<Vec<u8>>> = words.iter().map(|w| hexadecimal(w)).collect();
+            let rows = match v.len() {
+                // no bytes at all
+                1 if words.is_empty() => vec![Vec::new()],
+                count => rows.filter(|rows| rows.len() == count).ok_or_else(wrong)?,
+            };
+            set(&[v.reference], Values::Binary(&rows))
+        }
+        ValueType::F32 | ValueType::Clock => Err(wrong()),
     }
 }

@@ -39,7 +39,7 @@ pub fn kind(v: &Variable) -> String {
         ValueType::F64 | ValueType::F32 => "number",
         ValueType::Bool => "truth value (true, false)",
         ValueType::String => "text",
-        ValueType::Binary => "row of bytes",
+        ValueType::Binary => "row of bytes in hexadecimal digits, as 00ff",
         ValueType::Clock => "tick",
         ValueType::Enumeration => "item of its enumeration",
         _ => "whole number in the range of its type",

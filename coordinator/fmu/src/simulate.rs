@@ -1,5 +1,6 @@
 //! One FMU alone: from its start to its end in equal steps, its outputs as rows of a table.
 
+use super::adapter::opening::other_length;
 use super::array_starts::ArrayStarts;
 use super::inputs::{self, Inputs, set_text};
 use super::limits;
@@ -134,6 +135,11 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     let variable = description.capabilities.variable_step;
     if !variable && stop - start - steps * step > ROUNDED * step {
         instance.note(&plan.early());
+    }
+    if let Some(named) = other_length(&description, step) {
+        instance.note(&format!(
+            "the FMU makes steps of one length, and its description says {named} s; it is stepped by {step} s: --step {named} fits"
+        ));
     }
     let values = Row { columns: &columns, on_nan: settings.on_nan, warned: Cell::new(false) };
     row(&marked(header(&columns), 0))?;
@@ -272,7 +278,7 @@ fn set_start(instance: &FmuInstance, v: &Variable, text: &str) -> Result {
         let numbers = text.split_whitespace().filter_map(|word| word.parse().ok());
         limits::check(v, &v.name, &numbers.collect::<Vec<f64>>())?;
     }
-    set_text(instance.foreign(), v, text)
+    set_text(|references, values| instance.set(references, values), v, text)
 }
 
 /// Start values and the initialisation from a start to a stop; the inputs over time, which are set.
@@ -506,11 +512,11 @@ fn read(instance: &FmuInstance, v: &Variable, not_finite: impl Fn(f64) -> Result
 /// Why a run from `start` to `stop` in steps of `step`, all in s, is none.
 fn no_steps(start: f64, stop: f64, step: f64) -> String {
     match () {
+        () if !(stop.is_finite() && stop > start) => {
+            format!("the run would end at {stop} s, and begins at {start} s: give a later, finite --stop")
+        }
         () if !(step.is_finite() && step > 0.0) => {
             format!("a step of {step} s is none: --step takes a number above 0")
-        }
-        () if !(stop.is_finite() && stop > start) => {
-            format!("the run would end at {stop} s, and begins at {start} s: give a later --stop")
         }
         () if stop - start < step => {
             format!(

@@ -163,7 +163,18 @@ impl Archive {
 
     /// Text of `modelDescription.xml` or another file at the top.
     pub fn text(&mut self, name: &str) -> Result<Option<Vec<u8>>> {
-        let limit = self.limits.description;
+        self.read(name, self.limits.description)
+    }
+
+    /// The bytes of an entry that is no longer than all together may be; none where there is no such entry.
+    ///
+    /// # Errors
+    /// [`Error::Archive`]: damaged, or too large.
+    pub fn bytes(&mut self, name: &str) -> Result<Option<Vec<u8>>> {
+        self.read(name, self.limits.total)
+    }
+
+    fn read(&mut self, name: &str, limit: u64) -> Result<Option<Vec<u8>>> {
         let (path, entry) = (self.path.clone(), Some(name.to_owned()));
         let fail = |message: String| Error::Archive { path: path.clone(), entry: entry.clone(), message };
         let file = match self.zip.by_name(name) {

@@ -67,7 +67,8 @@ pub fn load(fmu: &Path, description: &ModelDescription, extracted: &Path) -> Res
     if !path.is_file() {
         return Err(fail(missing(description, extracted, &name)));
     }
-    inspect(&path).map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))?;
+    let bytes = std::fs::read(&path).map_err(|e| fail(format!("`{name}` cannot be loaded: {e}")))?;
+    inspect(&bytes).map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))?;
     let threads = threads();
     let _mode = Keep::new();
     open(&path)
@@ -97,16 +98,15 @@ fn missing(description: &ModelDescription, extracted: &Path, name: &str) -> Stri
     format!("has no library `binaries/{wanted}/{name}` for this platform; {has}")
 }
 
-/// Whether the file can be a library of this machine, as far as its bytes show.
-fn inspect(path: &Path) -> std::result::Result<(), String> {
-    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
-    if !elf::is_elf(&bytes) {
+/// Whether bytes can be a library of this machine, as far as they show.
+pub fn inspect(bytes: &[u8]) -> std::result::Result<(), String> {
+    if !elf::is_elf(bytes) {
         return Err("it is no shared library (no ELF header)".into());
     }
-    if let Some(machine) = elf::foreign_machine(&bytes) {
+    if let Some(machine) = elf::foreign_machine(bytes) {
         return Err(format!("it is made for another kind of machine (ELF number {machine})"));
     }
-    match elf::mapped_length(&bytes) {
+    match elf::mapped_length(bytes) {
         None => Err("it is no library for 64 bits, or its head is cut off".into()),
         Some(whole) if whole > bytes.len() => Err(format!("it is cut off after {} bytes", bytes.len())),
         Some(_) => Ok(()),

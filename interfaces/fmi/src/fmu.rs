@@ -51,6 +51,17 @@ impl Fmu {
         Ok((description, names))
     }
 
+    /// Why its library for this platform cannot be loaded, as far as the bytes show; none where they can be, or where there is none.
+    ///
+    /// # Errors
+    /// [`Error::Archive`](crate::Error::Archive): it cannot be unpacked.
+    pub fn library_defect(path: &Path, description: &ModelDescription) -> Result<Option<String>> {
+        let entry = binary::library_entry(description);
+        let bytes = Archive::open(path, Limits::default())?.bytes(&entry)?;
+        let why = bytes.and_then(|bytes| binary::inspect(&bytes).err());
+        Ok(why.map(|why| format!("`{entry}` cannot be loaded: {why}")))
+    }
+
     fn describe(path: &Path, archive: &mut Archive) -> Result<ModelDescription> {
         let bytes = archive.text("modelDescription.xml")?.unwrap_or_default();
         let terminals = match archive.text("terminalsAndIcons/terminalsAndIcons.xml")? {

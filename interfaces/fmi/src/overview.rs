@@ -7,6 +7,7 @@ use crate::archive::{Archive, Limits};
 use crate::binary::platforms;
 use crate::error::{Error, Result};
 use roxmltree::{Document, Node};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Elements for the interface types of an FMU, and the words for them.
@@ -110,7 +111,11 @@ impl Overview {
         let categories = child("LogCategories").into_iter().flat_map(elements);
         let category = |n: Node| (attribute(n, "name"), attribute(n, "description"));
         overview.log_categories = categories.map(category).collect();
-        overview.variables = child("ModelVariables").into_iter().flat_map(elements).map(variable).collect();
+        let variables = || child("ModelVariables").into_iter().flat_map(elements);
+        let sizes = variables().filter(|n| n.attribute("causality") == Some("structuralParameter"));
+        let sizes =
+            sizes.filter_map(|n| Some((n.attribute("valueReference")?, n.attribute("name")?))).collect();
+        overview.variables = variables().map(|n| variable(n, &sizes)).collect();
         Ok(overview)
     }
 
@@ -150,13 +155,18 @@ fn interfaces(root: Node) -> Vec<(String, Vec<Fact>)> {
     }
 }
 
-fn variable(of: Node) -> VariableFacts {
+/// A variable; `named` are the structural parameters by value reference.
+fn variable(of: Node, named: &BTreeMap<&str, &str>) -> VariableFacts {
     // the type of FMI 1.0 and 2.0 is an element inside, that of FMI 3.0 the element itself
     let inside = elements(of).find(|n| TYPES.contains(&n.tag_name().name()));
     let typed = inside.unwrap_or(of);
     let sizes: Vec<String> = elements(of)
         .filter(|n| n.tag_name().name() == "Dimension")
-        .map(|n| n.attribute("start").or(n.attribute("valueReference")).unwrap_or("?").to_owned())
+        .map(|n| {
+            let parameter =
+                || n.attribute("valueReference").and_then(|reference| named.get(reference).copied());
+            n.attribute("start").or_else(parameter).unwrap_or("?").to_owned()
+        })
         .collect();
     let name = typed.tag_name().name();
     let value_type = if sizes.is_empty() { name.to_owned() } else { format!("{name}[{}]", sizes.join(",")) };

@@ -96,14 +96,14 @@ impl FeedThroughs {
         self.judged[slot].iter().any(|row| self.follows(slot, *row, input))
     }
 
-    /// Those values that an output of their target follows at once and that are in no loop of such values.
-    pub fn outside_loops(&self, values: &[ConnectedValue]) -> Vec<ConnectedValue> {
+    /// Those values that an output of their target follows at once: in no loop of such values, and in one.
+    pub fn by_loops(&self, values: &[ConnectedValue]) -> [Vec<ConnectedValue>; 2] {
         let graph = Graph::new(self, values);
         let component = components(graph.nodes, &graph.edges);
-        let wanted = |v: &(usize, &ConnectedValue)| {
-            graph.followed[v.0] && component[graph.value(v.0)] != component[graph.source[v.0]]
-        };
-        values.iter().enumerate().filter(wanted).map(|(_, value)| *value).collect()
+        let followed = values.iter().enumerate().filter(|(k, _)| graph.followed[*k]);
+        let in_loop = |k: usize| component[graph.value(k)] == component[graph.source[k]];
+        let (inside, outside): (Vec<_>, Vec<_>) = followed.partition(|(k, _)| in_loop(*k));
+        [outside, inside].map(|part| part.into_iter().map(|(_, value)| *value).collect())
     }
 
     /// Of values in no loop, those that can be passed within a step in which each subsystem is stepped once. Where outputs of one
@@ -220,7 +220,7 @@ mod tests {
     }
 
     fn passed(of: &FeedThroughs, values: &[ConnectedValue]) -> Vec<usize> {
-        let kept = of.in_one_pass(of.outside_loops(values));
+        let kept = of.in_one_pass(of.by_loops(values)[0].clone());
         kept.iter().filter_map(|v| values.iter().position(|own| own == v)).collect()
     }
 

@@ -364,7 +364,7 @@ fn cannot_repeat(instance: &Instance, schedule: &StepSchedule) -> Option<&'stati
 }
 
 /// The first of many names, and how many more there are.
-fn listed(names: &[String]) -> String {
+pub(super) fn listed(names: &[String]) -> String {
     const SHOWN: usize = 8;
     match names.len().saturating_sub(SHOWN) {
         0 => names.join(", "),

@@ -5,6 +5,7 @@
 //! of another kind and those that make steps of another length keep the order of Jacobi: their inputs are the outputs of the start of the step.
 //! FMUs that take values of loops that are iterated follow when these are solved.
 
+use super::loops::listed;
 use super::schedule::StepSchedule;
 use crate::graph::levels;
 use crate::signals::{ConnectedValue, Faults, FeedThroughs, Links, Place};
@@ -36,7 +37,9 @@ impl StepOrder {
         schedules: &mut [StepSchedule],
     ) -> Self {
         let candidates = candidates(links, faults, instances, schedules);
-        let passed = feed_through.in_one_pass(feed_through.outside_loops(&candidates));
+        let [outside, inside] = feed_through.by_loops(&candidates);
+        warn_of_loops(&inside, instances);
+        let passed = feed_through.in_one_pass(outside);
         let edges: Vec<[usize; 2]> = passed.iter().map(|v| v.ends.map(|(slot, _)| slot)).collect();
         let level = levels(instances.len(), &edges);
         let mut order = Self::default();
@@ -122,6 +125,24 @@ impl StepOrder {
         }
         Ok(())
     }
+}
+
+/// Warns of values that follow each other at once in a loop, and are late by a step therefore.
+fn warn_of_loops(inside: &[ConnectedValue], instances: &[Instance]) {
+    if inside.is_empty() {
+        return;
+    }
+    let name = |(slot, id): (usize, u32)| {
+        let variable = instances[slot].variables().iter().find(|v| v.id == id);
+        format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
+    };
+    let names: Vec<String> =
+        inside.iter().map(|v| format!("{} → {}", name(v.ends[0]), name(v.ends[1]))).collect();
+    log::warn!(
+        "{} follow each other at once in a loop (ModelStructure), so that they are late by a step and can diverge: \
+         `order = \"iterate\"` solves the loop, `order = \"jacobi\"` takes the delay",
+        listed(&names)
+    );
 }
 
 /// Values that may be passed within a step.

@@ -64,17 +64,24 @@ pub(super) fn warn_of_end(stop_time_s: f64, host: &dyn Host) {
     host.log(LogLevel::Warning, &text);
 }
 
+/// The length of a step that the description of an FMU with steps of one length names, where steps of length h are no whole number
+/// of them, s.
+pub(crate) fn other_length(description: &ModelDescription, h: f64) -> Option<f64> {
+    let capabilities = &description.capabilities;
+    let named = capabilities.fixed_step.or(description.experiment.step).filter(|named| *named > 0.0);
+    let named = named.filter(|_| !capabilities.variable_step && h > 0.0)?;
+    (h < named || !is_whole(h, named)).then_some(named)
+}
+
+fn is_whole(long: f64, short: f64) -> bool {
+    (long / short - (long / short).round()).abs() < 1e-6
+}
+
 /// Says where steps of one length only are not those that the description names.
 #[cold]
 pub(super) fn warn_of_length(description: &ModelDescription, h: f64, host: &dyn Host) {
-    let capabilities = &description.capabilities;
-    let named = capabilities.fixed_step.or(description.experiment.step).filter(|named| *named > 0.0);
-    let Some(named) = named.filter(|_| !capabilities.variable_step && h > 0.0) else { return };
-    let whole = |long: f64, short: f64| (long / short - (long / short).round()).abs() < 1e-6;
-    if h >= named && whole(h, named) {
-        return;
-    }
-    let cure = match h < named && whole(named, h) {
+    let Some(named) = other_length(description, h) else { return };
+    let cure = match h < named && is_whole(named, h) {
         true => format!("`step_multiple = {}` makes its steps as long", (named / h).round()),
         false => format!("`time.step_s = {named}`, or a whole part of it and `step_multiple`, fits"),
     };

@@ -301,7 +301,7 @@ impl Link {
         self.child.end();
         let last_words = if self.is_python { python::last_words } else { printed::last_words };
         let said = last_words(self.folder.path());
-        let why = format!("its process was lost: {why}{said}");
+        let why = format!("{}: {why}{said}", terraglue_diagnostics::error::LOST);
         self.gone = Some(why.clone());
         Error::Fatal(why)
     }

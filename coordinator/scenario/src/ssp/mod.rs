@@ -89,7 +89,7 @@ fn times(package: &Package, network: &Network, notes: &mut Vec<String>) -> Resul
     let experiments = || network.parts.iter().map(|p| p.description.experiment);
     let longest = experiments().filter_map(|e| e.stop).reduce(f64::max);
     let duration = structure.stop_s.or(longest).unwrap_or_else(|| {
-        notes.push("the system gives no stop time: time.duration_s = 1".into());
+        notes.push("the system gives no stop time: time.duration_s is 1, unless --set gives another".into());
         1.0
     });
     let own = network
@@ -97,7 +97,10 @@ fn times(package: &Package, network: &Network, notes: &mut Vec<String>) -> Resul
         .iter()
         .filter_map(|p| p.description.experiment.step.or(p.description.capabilities.fixed_step));
     let wanted = own.filter(|s| *s > 0.0).reduce(f64::min).unwrap_or_else(|| {
-        notes.push("no FMU names a step: time.step_s is a thousandth of the duration".into());
+        notes.push(
+            "no FMU names a step: time.step_s is a thousandth of the duration, unless --set gives another"
+                .into(),
+        );
         duration / STEPS
     });
     if !(duration > 0.0 && duration.is_finite() && wanted.is_finite()) {

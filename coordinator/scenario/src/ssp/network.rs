@@ -151,7 +151,13 @@ impl<'a> Network<'a> {
                     })?;
                 }
                 SystemElement::Component(component) => {
-                    let (description, _) = Fmu::inspect(&package.folder().join(&component.source))?;
+                    let file = package.folder().join(&component.source);
+                    let (description, _) = Fmu::inspect(&file).map_err(|error| {
+                        // the package lies unpacked in a folder of its own
+                        let message =
+                            error.to_string().replace(&file.display().to_string(), &component.source);
+                        refused(package, format!("the component `{inner}`: {message}"))
+                    })?;
                     self.connectors(&inner, &component.connectors);
                     let name = self.free_name(&inner);
                     self.parts.push(Part { name, path: inner, component, description });

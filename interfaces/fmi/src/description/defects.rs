@@ -9,9 +9,10 @@ use terraglue_subsystem::ValueType;
 /// Finds defects of one variable.
 type Rule = fn(&ModelDescription, &Variable) -> Option<String>;
 
-const RULES: [(DefectKind, Rule); 16] = [
+const RULES: [(DefectKind, Rule); 17] = [
     (DefectKind::Enumeration, enumeration),
     (DefectKind::Enumeration, same_items),
+    (DefectKind::Enumeration, declared_type),
     (DefectKind::Role, initial),
     (DefectKind::Role, clocked),
     (DefectKind::Range, range),
@@ -43,7 +44,7 @@ impl ModelDescription {
     }
 }
 
-/// All defects, those of variables in their order first.
+/// All defects, those of attributes and lists first, then those of variables in their order.
 fn all(description: &ModelDescription) -> Vec<Defect> {
     let own = description.variables.iter().filter(|v| !v.alias);
     let of_variable = |v| {
@@ -53,10 +54,8 @@ fn all(description: &ModelDescription) -> Vec<Defect> {
             Some(Defect { kind: *kind, line: Some(v.line), message })
         })
     };
-    own.flat_map(of_variable)
-        .chain(structure(description))
-        .chain(description.details.iter().cloned())
-        .collect()
+    let details = description.details.iter().cloned();
+    details.chain(own.flat_map(of_variable)).chain(structure(description)).collect()
 }
 
 /// One warning for each kind of defect: the first of them, and how many more there are.
@@ -83,6 +82,11 @@ fn enumeration(_: &ModelDescription, v: &Variable) -> Option<String> {
         .then(|| "is an enumeration without a declared type that lists its items".into())
 }
 
+fn declared_type(_: &ModelDescription, v: &Variable) -> Option<String> {
+    let foreign = v.value_type != ValueType::Enumeration && !v.items.is_empty();
+    foreign.then(|| format!("is {} and has the declared type of an enumeration", type_name(v.value_type)))
+}
+
 fn same_items(_: &ModelDescription, v: &Variable) -> Option<String> {
     let twice = |(k, (_, number)): (usize, &(String, i64))| {
         v.items[..k].iter().any(|(_, other)| other == number).then_some(*number)
@@ -91,11 +95,17 @@ fn same_items(_: &ModelDescription, v: &Variable) -> Option<String> {
     Some(format!("is an enumeration with two items of the value {number}"))
 }
 
-/// Inputs and the independent variable start exactly, and say nothing of it (FMI 2.0.4 §2.2.7, FMI 3.0.2 §2.4.7.5).
-fn initial(_: &ModelDescription, v: &Variable) -> Option<String> {
-    let silent = matches!(v.causality, Causality::Input | Causality::Independent);
-    (silent && v.initial.is_some())
-        .then(|| format!("is {:?} and has `initial`, which it must not", v.causality))
+/// Inputs and the independent variable start exactly, and say nothing of it (FMI 2.0.4 §2.2.7); inputs may say so in FMI 3
+/// (FMI 3.0.2 §2.4.7.5, table of `initial`).
+fn initial(d: &ModelDescription, v: &Variable) -> Option<String> {
+    let initial = v.initial?;
+    match (v.causality, d.version) {
+        (Causality::Input, Version::V3) if initial == Initial::Exact => None,
+        (Causality::Input | Causality::Independent, _) => {
+            Some(format!("is {:?} and has `initial`, which it must not", v.causality))
+        }
+        _ => None,
+    }
 }
 
 /// A variable that belongs to clocks changes when they tick (FMI 3.0.2 §2.4.7.4).
@@ -136,6 +146,9 @@ fn holds_single(x: f64) -> bool {
 }
 
 fn range(_: &ModelDescription, v: &Variable) -> Option<String> {
+    if v.min.is_nan() || v.max.is_nan() {
+        return Some(format!("has min = {} and max = {}: NaN is no number", v.min, v.max));
+    }
     if v.min > v.max {
         return Some(format!("has min = {} above max = {}", v.min, v.max));
     }
@@ -208,13 +221,19 @@ fn start_missing(_: &ModelDescription, v: &Variable) -> Option<String> {
         .then(|| "needs a start value".into())
 }
 
+/// Where nothing else is said, outputs, local variables and calculated parameters that are not constant are calculated
+/// (FMI 2.0.4 §2.2.7, FMI 3.0.2 §2.4.7.5, tables of `initial`).
 fn start_calculated(_: &ModelDescription, v: &Variable) -> Option<String> {
     if v.start == Start::None {
         return None;
     }
+    let result = matches!(v.causality, Causality::Output | Causality::Local | Causality::CalculatedParameter);
     match (v.causality, v.initial) {
         (Causality::Independent, _) => Some("is the independent variable and has a start value".into()),
         (_, Some(Initial::Calculated)) => Some("is initially calculated and has a start value".into()),
+        (_, None) if result && v.variability != Variability::Constant => {
+            Some("has a start value and is initially calculated, as it has no `initial`".into())
+        }
         _ => None,
     }
 }

@@ -15,6 +15,7 @@ pub fn defects(root: &Element, version: Version, experiment: &Experiment) -> Vec
     all.extend(of_experiment(root, experiment));
     all.extend(counts(root));
     all.extend(order(root, version));
+    all.extend(twice(root));
     if version == Version::V2 {
         all.extend(parameters_2(root));
     }
@@ -70,6 +71,35 @@ fn order(root: &Element, version: Version) -> Option<Defect> {
         return Some(Defect { kind: DefectKind::Attribute, line: Some(element.line()), message });
     }
     None
+}
+
+/// What may be there once and is there again: the first of them counts.
+fn twice(root: &Element) -> Vec<Defect> {
+    let again = |kind: DefectKind, element: &Element, message: String| Defect {
+        kind,
+        line: Some(element.line()),
+        message,
+    };
+    let (mut all, mut seen) = (Vec::new(), BTreeSet::new());
+    for element in root.children() {
+        if !seen.insert(element.name()) {
+            let message = format!("<{}> is there for the second time", printable(element.name()));
+            all.push(again(DefectKind::Attribute, &element, message));
+        }
+    }
+    let (units, mut names) = (root.child("UnitDefinitions"), BTreeSet::new());
+    for unit in units.into_iter().flat_map(|list| list.children().collect::<Vec<_>>()) {
+        let name = unit.text("name");
+        if !names.insert(name) {
+            let message = format!("the unit `{}` is defined for the second time", printable(name));
+            all.push(again(DefectKind::Unit, &unit, message));
+        }
+        if unit.children().filter(|e| e.name() == "BaseUnit").count() > 1 {
+            let message = format!("the unit `{}` has a second <BaseUnit>", printable(name));
+            all.push(again(DefectKind::Unit, &unit, message));
+        }
+    }
+    all
 }
 
 /// Counts and lengths that are negative, or no numbers.

@@ -20,7 +20,8 @@ pub fn defects(root: &Element, description: &ModelDescription) -> Vec<Defect> {
     let listed: BTreeSet<usize> = description.initial_unknowns.iter().map(|u| u.variable).collect();
     let lookup = Lookup::of(description);
     let wanted = wanted(&structure, description, &lookup);
-    let lost = listed_besides(&structure, description.version).filter_map(|e| lost(&e, &lookup));
+    let listed_too = listed_besides(&structure, description.version);
+    let lost = listed_too.filter_map(|e| lost(&e, &lookup).or_else(|| of_nothing(&e, description, &lookup)));
     let lacks = message(description, wanted.difference(&listed), "is not listed", "are not listed");
     let extra =
         message(description, listed.difference(&wanted), "does not belong there", "do not belong there");
@@ -51,6 +52,23 @@ fn lost(element: &Element, lookup: &Lookup) -> Option<Defect> {
     })
 }
 
+/// The defect of a derivative of a state that does not name its state.
+fn of_nothing(element: &Element, d: &ModelDescription, lookup: &Lookup) -> Option<Defect> {
+    if !is_derivative(element) {
+        return None;
+    }
+    let v = &d.variables[lookup.find(element.attribute(lookup.key())?.trim().parse().ok()?)?];
+    let message = format!(
+        "`{}` is listed as the derivative of a state in ModelStructure and has no attribute `derivative`",
+        printable(&v.name)
+    );
+    v.derivative_of.is_none().then(|| Defect { kind: DefectKind::Derivative, line: Some(v.line), message })
+}
+
+fn is_derivative(element: &Element) -> bool {
+    matches!(element.name(), "Unknown" | "ContinuousStateDerivative")
+}
+
 /// Positions of the variables that are to be listed.
 fn wanted(structure: &Element, d: &ModelDescription, lookup: &Lookup) -> BTreeSet<usize> {
     let own = |v: &Variable| match v.causality {
@@ -71,8 +89,7 @@ fn wanted(structure: &Element, d: &ModelDescription, lookup: &Lookup) -> BTreeSe
 /// Positions of the derivatives that the structure lists.
 fn derivatives(structure: &Element, version: Version, lookup: &Lookup) -> Vec<usize> {
     let position = |e: Element| lookup.find(e.attribute(lookup.key())?.trim().parse().ok()?);
-    let derivative = |e: &Element| matches!(e.name(), "Unknown" | "ContinuousStateDerivative");
-    listed_besides(structure, version).filter(derivative).filter_map(position).collect()
+    listed_besides(structure, version).filter(is_derivative).filter_map(position).collect()
 }
 
 /// Whether the start value is exact, by the table of defaults where `initial` is not given.

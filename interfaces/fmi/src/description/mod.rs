@@ -15,6 +15,7 @@ pub(crate) mod types;
 mod variables;
 
 pub use model::*;
+pub use variables::hexadecimal;
 
 use crate::error::{Error, Result};
 use element::{Element, Reader};

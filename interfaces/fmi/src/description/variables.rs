@@ -291,7 +291,8 @@ fn start(inner: &Element, value_type: ValueType) -> Result<Start> {
     }
 }
 
-fn hexadecimal(text: &str) -> Option<Vec<u8>> {
+/// Bytes written in hexadecimal digits.
+pub fn hexadecimal(text: &str) -> Option<Vec<u8>> {
     let digits: Vec<u8> = text.bytes().filter(|b| !b.is_ascii_whitespace()).collect();
     if !digits.len().is_multiple_of(2) || !digits.is_ascii() {
         return None;

@@ -52,7 +52,7 @@ impl Clocks {
         let told = |v: &Variable| Some(ToldClock::new(v.reference, v.told?, v.fraction));
         Self {
             periodic: clocks().filter_map(|v| Some((v.reference, v.ticks?))).collect(),
-            told: ToldClocks(clocks().filter_map(told).collect()),
+            told: ToldClocks::new(clocks().filter_map(told).collect()),
             due: Vec::new(),
             ticked: vec![false; outputs.len()],
             outputs,
@@ -73,10 +73,12 @@ impl Clocks {
         self.told.next(first)
     }
 
-    /// Whether a clock ticks at t by itself.
+    /// Whether a clock ticks at t by itself, or the FMU has announced an event there.
     #[inline]
     pub(super) fn tick_at(&self, t: f64) -> bool {
-        self.periodic.iter().any(|(_, ticks)| ticks.at(t)) || self.told.any_due(t)
+        self.periodic.iter().any(|(_, ticks)| ticks.at(t))
+            || self.told.any_due(t)
+            || self.told.event_is_due(t)
     }
 
     /// Whether a clock ticks at t because the FMU has just reported it.

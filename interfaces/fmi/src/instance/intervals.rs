@@ -1,9 +1,9 @@
-//! Clocks whose intervals the FMU reports in event mode (FMI 3.0, 2.2.9): each tick the time to the next one (`calculated`,
-//! `tunable`, `changing`), or any event the time to a single tick (`countdown`).
+//! Times that the FMU reports in event mode: of its next event (`nextEventTime`), and of clocks (FMI 3.0, 2.2.9): each tick the time to
+//! the next one (`calculated`, `tunable`, `changing`), or any event the time to a single tick (`countdown`).
 //!
 //! Intervals reported as fractions are added up as whole numbers, so that a clock of 1/3 s does not drift.
 //!
-//! The last reported intervals belong to the state of the instance: they are saved and restored with it.
+//! The last reported times belong to the state of the instance: they are saved and restored with it.
 
 use super::foreign::ForeignInstance;
 use super::functions::Api;
@@ -17,6 +17,8 @@ const NOT_YET_KNOWN: c_int = 0;
 const UNCHANGED: c_int = 1;
 /// Numbers of a clock in a schedule.
 const KEPT: usize = 6;
+/// Numbers of a schedule before those of its clocks.
+const OWN: usize = 2;
 /// Whole numbers up to here are exact in f64.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
@@ -75,7 +77,7 @@ impl ToldClock {
 
     /// Whether it ticks at t.
     pub fn is_due(&self, t: f64) -> bool {
-        let slack = 1e-9 * self.interval.get() + 4.0 * f64::EPSILON * t.abs();
+        let slack = 1e-9 * self.interval.get() + rounding(t);
         self.next.get() <= t + slack
     }
 
@@ -151,36 +153,73 @@ impl ToldClock {
     }
 }
 
-/// All such clocks of an instance.
-#[derive(Default)]
-pub(super) struct ToldClocks(pub(super) Vec<ToldClock>);
+/// What sums of steps may be off at t, s.
+fn rounding(t: f64) -> f64 {
+    4.0 * f64::EPSILON * t.abs()
+}
+
+/// All that an instance has reported.
+pub(super) struct ToldClocks {
+    clocks: Vec<ToldClock>,
+    /// Time of the next event, s; ∞: the FMU has announced none.
+    event: Cell<f64>,
+    /// Whether the instance is in event mode between two steps, as a discrete input has changed.
+    pub changes: Cell<bool>,
+}
+
+impl Default for ToldClocks {
+    fn default() -> Self {
+        Self::new(Vec::new())
+    }
+}
 
 impl ToldClocks {
+    /// Of these clocks.
+    pub fn new(clocks: Vec<ToldClock>) -> Self {
+        Self { clocks, event: Cell::new(f64::INFINITY), changes: Cell::new(false) }
+    }
+
     /// The run starts at this time, s.
     pub fn begin(&self, start: f64) {
-        self.0.iter().for_each(|clock| clock.begin(start));
+        self.clocks.iter().for_each(|clock| clock.begin(start));
     }
 
-    /// The first tick that is known, or `end`, s.
+    /// The first tick or event that is known, or `end`, s.
     #[inline]
     pub fn next(&self, end: f64) -> f64 {
-        self.0.iter().map(ToldClock::next).fold(end, f64::min)
+        self.clocks.iter().map(ToldClock::next).fold(end.min(self.event.get()), f64::min)
     }
 
-    /// Whether one of them ticks at t.
+    /// Whether one of the clocks ticks at t.
     #[inline]
     pub fn any_due(&self, t: f64) -> bool {
-        self.0.iter().any(|clock| clock.is_due(t))
+        self.clocks.iter().any(|clock| clock.is_due(t))
+    }
+
+    /// Whether the next event is at t, up to rounding.
+    #[inline]
+    pub fn event_is_due(&self, t: f64) -> bool {
+        self.event.get() <= t + rounding(t)
+    }
+
+    /// Takes the time of the next event that the FMU reports at t; whether that is at once. The reason where it is not valid.
+    pub fn expect(&self, t: f64, next: Option<f64>) -> std::result::Result<bool, String> {
+        let at = next.unwrap_or(f64::INFINITY);
+        if at.is_nan() || at < t - rounding(t) {
+            return Err(format!("says at t = {t} s that its next event is at {at} s"));
+        }
+        self.event.set(at);
+        Ok(at <= t)
     }
 
     /// Numbers in calls of those that tick at t; they have ticked then.
     pub fn take(&self, t: f64) -> impl Iterator<Item = u32> {
-        self.0.iter().filter(move |clock| clock.take(t)).map(|clock| clock.reference)
+        self.clocks.iter().filter(move |clock| clock.take(t)).map(|clock| clock.reference)
     }
 
     /// In event mode, once discrete states are settled: asks for new intervals.
     pub fn ask(&self, foreign: &ForeignInstance, t: f64) -> Result {
-        if self.0.is_empty() {
+        if self.clocks.is_empty() {
             return Ok(());
         }
         self.ask_decimals(foreign, t)?;
@@ -190,7 +229,7 @@ impl ToldClocks {
     fn ask_decimals(&self, foreign: &ForeignInstance, t: f64) -> Result {
         const NAME: &str = "fmi3GetIntervalDecimal";
         let Api::Three(three) = foreign.api else { return Ok(()) };
-        let told = || self.0.iter().filter(|clock| !clock.fraction);
+        let told = || self.clocks.iter().filter(|clock| !clock.fraction);
         let references: Vec<u32> = told().map(|clock| clock.reference).collect();
         if references.is_empty() {
             return Ok(());
@@ -209,7 +248,7 @@ impl ToldClocks {
     fn ask_fractions(&self, foreign: &ForeignInstance, t: f64) -> Result {
         const NAME: &str = "fmi3GetIntervalFraction";
         let Api::Three(three) = foreign.api else { return Ok(()) };
-        let told = || self.0.iter().filter(|clock| clock.fraction);
+        let told = || self.clocks.iter().filter(|clock| clock.fraction);
         let references: Vec<u32> = told().map(|clock| clock.reference).collect();
         if references.is_empty() {
             return Ok(());
@@ -227,22 +266,26 @@ impl ToldClocks {
         Ok(())
     }
 
-    /// Appends the last reported intervals, to be kept with a saved state.
+    /// Appends the last reported times, to be kept with a saved state.
     pub fn schedule(&self, out: &mut Vec<f64>) {
         out.clear();
-        out.extend(self.0.iter().flat_map(|clock| clock.numbers().map(Cell::get)));
+        out.extend([self.event.get(), f64::from(u8::from(self.changes.get()))]);
+        out.extend(self.clocks.iter().flat_map(|clock| clock.numbers().map(Cell::get)));
     }
 
-    /// Restores the intervals that were kept with a saved state.
+    /// Restores the times that were kept with a saved state.
     pub fn reschedule(&self, schedule: &[f64]) {
-        for (clock, kept) in self.0.iter().zip(schedule.chunks_exact(KEPT)) {
+        let Some(([event, changes], clocks)) = schedule.split_first_chunk::<OWN>() else { return };
+        self.event.set(*event);
+        self.changes.set(*changes != 0.0);
+        for (clock, kept) in self.clocks.iter().zip(clocks.chunks_exact(KEPT)) {
             clock.numbers().into_iter().zip(kept).for_each(|(own, kept)| own.set(*kept));
         }
     }
 
     /// Numbers of a schedule.
     pub fn schedule_len(&self) -> usize {
-        KEPT * self.0.len()
+        OWN + KEPT * self.clocks.len()
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod clocks;
 mod configure;
+mod discrete;
 mod follow;
 mod foreign;
 mod functions;
@@ -112,6 +113,8 @@ pub struct FmuInstance {
     description: Arc<ModelDescription>,
     clocks: Clocks,
     start: f64,
+    /// Value references of discrete inputs whose changes are events, ascending; none without event mode.
+    discrete_inputs: Vec<u32>,
     /// Value references that are read in intermediate updates.
     shown: Vec<u32>,
     /// Value references that may be read or set in intermediate updates.
@@ -184,6 +187,7 @@ impl FmuInstance {
             description: description.clone(),
             clocks,
             start: 0.0,
+            discrete_inputs: if event_mode { discrete::inputs(description) } else { Vec::new() },
             shown,
             announced,
             own_time: Cell::new(false),
@@ -255,6 +259,12 @@ impl FmuInstance {
     #[allow(clippy::missing_errors_doc)]
     #[inline(always)]
     pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
+        if self.event_mode
+            && !self.discrete_inputs.is_empty()
+            && self.before_set(references, Values::F64(values))?
+        {
+            return Ok(());
+        }
         self.foreign.set_f64(references, values)
     }
 
@@ -267,6 +277,9 @@ impl FmuInstance {
     /// [`ForeignInstance::set`].
     #[allow(clippy::missing_errors_doc)]
     pub fn set(&self, references: &[u32], values: Values) -> Result {
+        if self.event_mode && !self.discrete_inputs.is_empty() && self.before_set(references, values)? {
+            return Ok(());
+        }
         self.foreign.set(references, values)
     }
 

@@ -130,12 +130,12 @@ impl FmuInstance {
     /// Goes from t to t + h (FMI 3), part by part: clocks tick and events are handled between the parts.
     fn do_step_3(&mut self, step: Advance) -> Result<Stepped> {
         let end = step.t + step.h;
-        let (mut t, mut events, mut returns) = (step.t, 0, 0);
+        let (mut t, mut events, mut reported, mut returns) = (step.t, 0, 0, 0);
         if self.updates {
             self.foreign.log.updates.forget_rows();
         }
         let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
-        if self.clocks.is_due() {
+        if self.clocks.is_due() || self.clocks.told.changes.get() {
             events += 1;
             if self.fire(t)? {
                 return Ok(Stepped { reached: t, terminate: true, events });
@@ -153,6 +153,8 @@ impl FmuInstance {
             let settles = event && self.event_mode || ticks;
             if settles {
                 events += 1;
+                // clocks tick as often as they say
+                reported += u32::from(event);
                 if self.handle_event(now, at_stop)? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
@@ -165,7 +167,7 @@ impl FmuInstance {
                 return Err(self.foreign.lied(DO_STEP_3, outcome));
             }
             returns += u32::from(!at_stop);
-            if let Some(outcome) = endless(events, returns) {
+            if let Some(outcome) = endless(reported, returns) {
                 return Err(self.foreign.lied(DO_STEP_3, outcome));
             }
             t = now;
@@ -281,10 +283,12 @@ impl FmuInstance {
         Ok(false)
     }
 
-    /// When a step begins: an event for the triggered clocks. Whether the FMU asks for the end.
+    /// When a step begins: an event for the triggered clocks and for discrete inputs that have changed. Whether the FMU asks for the end.
     fn fire(&mut self, t: f64) -> Result<bool> {
         let Api::Three(three) = self.foreign.api else { return Ok(false) };
-        self.foreign.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
+        if !self.clocks.told.changes.replace(false) {
+            self.foreign.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
+        }
         self.clocks.tick_without_periodic(&self.foreign, t, true)?;
         let end = self.update_discrete_states(t)?;
         self.foreign.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
@@ -323,12 +327,16 @@ impl FmuInstance {
             if terminate {
                 return Ok(true);
             }
+            let next = defined.then_some(next);
+            let at_once =
+                self.clocks.told.expect(t, next).map_err(|outcome| self.foreign.lied(NAME, outcome))?;
             if !again {
                 self.clocks.told.ask(&self.foreign, t)?;
-                if !self.clocks.told_at(t) {
+                if self.clocks.told_at(t) {
+                    self.clocks.tick_told(&self.foreign, t)?;
+                } else if !at_once {
                     return Ok(false);
                 }
-                self.clocks.tick_told(&self.foreign, t)?;
             }
         }
         Err(self.foreign.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))

@@ -54,16 +54,50 @@ def test_a_time_that_no_event_can_have_is_an_error(tmp_path, time):
     assert done.returncode == 1 and "fmi3UpdateDiscreteStates" in done.stderr and "next event" in done.stderr, done.stderr
 
 
-def counting(folder):
+@pytest.mark.parametrize("before", [5e-11, 1e-13])
+def test_an_event_shortly_before_a_communication_point_is_not_stepped_over(tmp_path, before):
+    jumps = JUMPS.replace("+= 0.1;", "+= 9;")
+    step = "if (t + h > v[2][0]) return 3; v[1][0] += h; v[3][0] = t + h;"
+    fmu = build_3(tmp_path, "timed", TIMED, step, start=f"v[2][0] = 0.1 - {before};", more=MODES + UPDATE % jumps, flags=EVENT_MODE)
+    done = terraglue("fmu", "run", fmu, "--event-mode", "on", "--step", "0.1", "--stop", "0.3")
+    assert [x for _, x, _ in rows(done)] == pytest.approx([0, 100.1, 100.2, 100.3]) and "warning" not in done.stderr, done.stderr
+
+
+def test_events_without_end_are_an_error(tmp_path):
+    step = "v[1][0] += h; v[3][0] = t + h;"
+    fmu = build_3(tmp_path, "timed", TIMED, step, more=MODES + UPDATE % "*defined = true; *next = v[3][0] + 1e-12;", flags=EVENT_MODE)
+    done = terraglue("fmu", "run", fmu, "--event-mode", "on", "--step", "0.1", "--stop", "0.3")
+    assert done.returncode == 1 and "at an event that was announced" in done.stderr, done.stderr
+
+
+def test_an_fmu_with_steps_of_one_length_has_its_events_at_their_ends(tmp_path):
+    step = "v[1][0] += 0.1; v[3][0] = t + h;"
+    fmu = build_3(tmp_path, "timed", TIMED, step, start="v[2][0] = 0.15;", more=MODES + UPDATE % JUMPS, flags=EVENT_MODE)
+    fmu = described(tmp_path, fmu, ('canHandleVariableCommunicationStepSize="true"', 'canHandleVariableCommunicationStepSize="false"'))
+    done = terraglue("fmu", "run", fmu, "--event-mode", "on", "--step", "0.1", "--stop", "0.4")
+    assert [x for _, x, _ in rows(done)] == pytest.approx([0, 0.1, 100.2, 200.3, 300.4])
+    assert done.stderr.count("handled at the end of the step") == 1, done.stderr
+
+
+def test_an_fmu_that_asks_for_the_end_at_the_start_makes_no_step(tmp_path):
+    fmu = build_3(tmp_path, "ends", TIMED, "return 3;", more=MODES + UPDATE % "*end = true;", flags=EVENT_MODE)
+    done = terraglue("fmu", "run", fmu, "--event-mode", "on", "--step", "0.1", "--stop", "0.4")
+    assert done.returncode == 0 and "asked for the end of the run at t = 0 s" in done.stderr, done.stderr
+    done, _ = recorded(tmp_path, '[time]\nstep_s = 0.1\nduration_s = 0.4\n[ends]\nfmu = "ends.fmu"\nevent_mode = true\n')
+    assert done.returncode == 1 and "asks for the end" in done.stderr, done.stderr
+
+
+def counting(folder, kind='causality="input" variability="discrete"'):
     """An FMU that takes its discrete input in event mode only, and counts the events in which it does."""
     refuses = 'if (*r == 5 && u->mode == 3) return no(u, "a discrete input is set in event mode");'
-    discrete = '<Float64 name="d" valueReference="5" causality="input" variability="discrete" start="0"/>'
+    discrete = f'<Float64 name="d" valueReference="5" {kind} start="0"/>'
     count = UPDATE % "if (v[5][0] != v[4][0]) { v[1][0] += 1; v[4][0] = v[5][0]; }"
     return build_3(folder, "counting", [("n", "output", "", ())], "", more=MODES + count, flags=EVENT_MODE, others=discrete, sets=refuses)
 
 
-def test_a_discrete_input_that_changes_is_an_event(tmp_path):
-    fmu = counting(tmp_path)
+@pytest.mark.parametrize("kind", ['causality="input" variability="discrete"', 'causality="parameter" variability="tunable"'])
+def test_a_discrete_input_that_changes_is_an_event(tmp_path, kind):
+    fmu = counting(tmp_path, kind)
     (tmp_path / "in.csv").write_text("time,d\n0,1\n0.2,2\n0.3,2\n0.4,1\n")
     found = rows(terraglue("fmu", "run", fmu, "--event-mode", "on", "--step", "0.1", "--stop", "0.5", "--input", tmp_path / "in.csv"))
     # the value of the start is set in initialisation

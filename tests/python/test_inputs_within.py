@@ -220,8 +220,12 @@ def test_what_cannot_be_followed_is_held(tmp_path):
         (two(tmp_path, "discrete", more=refuses, others=discrete), "d"),
         (three(tmp_path, "silent", more=ASK.replace("s, true, false", "s, false, false")), "u"),
     ]:
-        done, found = run(fmu, table(tmp_path, (0, 0), (2, 2), names=name))
+        # a discrete input has the value of the row before
+        rows = [(t / 4, t / 4) for t in range(5)] if name == "d" else [(0, 0), (2, 2)]
+        done, found = run(fmu, table(tmp_path, *rows, names=name))
         assert done.returncode == 0 and [row["y"] for row in found] == pytest.approx(held, abs=1e-12), (fmu, done.stderr)
+    done, found = run(tmp_path / "discrete.fmu", table(tmp_path, (0, 1), (0.6, 2), (2, 3), names="d"))
+    assert [row["y"] for row in found] == pytest.approx([0, 0.25, 0.5, 0.75, 1.25], abs=1e-12)
 
 
 def test_a_function_that_is_promised_and_missing_is_named(tmp_path):

@@ -9,6 +9,7 @@
 struct Readme;
 
 mod graph;
+mod listed;
 pub mod observer;
 pub mod signals;
 pub mod testbed;

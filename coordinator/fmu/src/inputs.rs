@@ -205,7 +205,9 @@ impl Input {
         let mut out = self.rest.clone();
         for (column, element) in &self.columns {
             match self.variable.variability {
-                Variability::Discrete => hold(table.cell(t, *column), *element, &mut out),
+                Variability::Discrete | Variability::Tunable => {
+                    hold(table.cell(t, *column), *element, &mut out)
+                }
                 _ => table.write(t, *column, *element, &mut out),
             }
             let written = element.map_or(&out[..], |k| &out[k..=k]);

@@ -112,7 +112,7 @@ fn can_start(description: &ModelDescription, name: &str) -> Result {
 pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
     let row = &mut *tables.rows;
     let plan = plan(fmu, settings)?;
-    let Plan { start, stop, step, steps } = plan;
+    let Plan { start, stop, steps, .. } = plan;
     let intermediate = match &tables.intermediate {
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
@@ -133,14 +133,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         write(&(header(&all) + ",step_finished"))?;
     }
     let variable = description.capabilities.variable_step;
-    if !variable && stop - start - steps * step > ROUNDED * step {
-        instance.note(&plan.early());
-    }
-    if let Some(named) = other_length(&description, step) {
-        instance.note(&format!(
-            "the FMU makes steps of one length, and its description says {named} s; it is stepped by {step} s: --step {named} fits"
-        ));
-    }
+    note_lengths(&instance, &plan);
     let values = Row { columns: &columns, on_nan: settings.on_nan, warned: Cell::new(false) };
     row(&marked(header(&columns), 0))?;
     row(&marked(values.at(&instance, start)?, 0))?;
@@ -292,6 +285,20 @@ fn initialize(instance: &mut FmuInstance, settings: &Settings, (start, stop): (f
     instance.exit_initialization()?;
     inputs.follow(instance)?;
     Ok(inputs)
+}
+
+/// Notes where an FMU with steps of one length ends before the run, or gets other steps than its description names.
+fn note_lengths(instance: &FmuInstance, plan: &Plan) {
+    let (description, step) = (instance.description(), plan.step);
+    let ends_early = plan.stop - plan.start - plan.steps * step > ROUNDED * step;
+    if !description.capabilities.variable_step && ends_early {
+        instance.note(&plan.early());
+    }
+    if let Some(named) = other_length(description, step) {
+        instance.note(&format!(
+            "the FMU makes steps of one length, and its description says {named} s; it is stepped by {step} s: --step {named} fits"
+        ));
+    }
 }
 
 /// The state before a step.

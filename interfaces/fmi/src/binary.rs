@@ -106,6 +106,10 @@ pub fn inspect(bytes: &[u8]) -> std::result::Result<(), String> {
     if let Some(machine) = elf::foreign_machine(bytes) {
         return Err(format!("it is made for another kind of machine (ELF number {machine})"));
     }
+    // ET_DYN
+    if let Some(kind) = bytes.get(16).filter(|kind| **kind != 3) {
+        return Err(format!("it is no shared library (ELF type {kind})"));
+    }
     match elf::mapped_length(bytes) {
         None => Err("it is no library for 64 bits, or its head is cut off".into()),
         Some(whole) if whole > bytes.len() => Err(format!("it is cut off after {} bytes", bytes.len())),

@@ -14,6 +14,7 @@ use super::schedule::{Span, StepSchedule};
 use super::step_order::StepOrder;
 use super::subsystems::Subsystems;
 use crate::graph::{components, reached};
+use crate::listed::listed;
 use crate::signals::{Faults, FeedThroughs, Link, Links};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -360,14 +361,5 @@ fn cannot_repeat(instance: &Instance, schedule: &StepSchedule) -> Option<&'stati
         StepSchedule { step_multiple: 2.., .. } => Some("makes steps of another length"),
         _ if !(can(Capabilities::RETRY) && can(Capabilities::STATE)) => Some("cannot save its state"),
         _ => None,
-    }
-}
-
-/// The first of many names, and how many more there are.
-pub(super) fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 8;
-    match names.len().saturating_sub(SHOWN) {
-        0 => names.join(", "),
-        more => format!("{} and {more} more", names[..SHOWN].join(", ")),
     }
 }

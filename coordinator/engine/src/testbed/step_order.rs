@@ -5,9 +5,9 @@
 //! of another kind and those that make steps of another length keep the order of Jacobi: their inputs are the outputs of the start of the step.
 //! FMUs that take values of loops that are iterated follow when these are solved.
 
-use super::loops::listed;
 use super::schedule::StepSchedule;
 use crate::graph::levels;
+use crate::listed::listed;
 use crate::signals::{ConnectedValue, Faults, FeedThroughs, Links, Place};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -138,9 +138,11 @@ fn warn_of_loops(inside: &[ConnectedValue], instances: &[Instance]) {
     };
     let names: Vec<String> =
         inside.iter().map(|v| format!("{} → {}", name(v.ends[0]), name(v.ends[1]))).collect();
+    let numbers = inside.iter().all(|v| matches!(v.connection, Place::Number(_)));
+    let solved = if numbers { "`order = \"iterate\"` solves the loop, " } else { "" };
     log::warn!(
-        "{} follow each other at once in a loop (ModelStructure), so that they are late by a step and can diverge: \
-         `order = \"iterate\"` solves the loop, `order = \"jacobi\"` takes the delay",
+        "{} follow each other at once in a loop (ModelStructure), so that they are late by a step and can diverge: {solved}\
+         `order = \"jacobi\"` takes the delay",
         listed(&names)
     );
 }

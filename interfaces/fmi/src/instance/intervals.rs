@@ -184,10 +184,17 @@ impl ToldClocks {
         self.clocks.iter().for_each(|clock| clock.begin(start));
     }
 
-    /// The first tick or event that is known, or `end`, s.
+    /// The first tick that is known, or `end`, s.
     #[inline]
     pub fn next(&self, end: f64) -> f64 {
-        self.clocks.iter().map(ToldClock::next).fold(end.min(self.event.get()), f64::min)
+        self.clocks.iter().map(ToldClock::next).fold(end, f64::min)
+    }
+
+    /// The time of the next event, if it is before `end`, s.
+    #[inline]
+    pub fn event_before(&self, end: f64) -> Option<f64> {
+        let at = self.event.get();
+        (at < end - rounding(end)).then_some(at)
     }
 
     /// Whether one of the clocks ticks at t.

@@ -127,6 +127,10 @@ pub struct FmuInstance {
     untold: Cell<bool>,
     /// Whether it was noted that it changes the floating-point mode.
     mode_told: Cell<bool>,
+    /// Whether it was noted that its events are late.
+    late_events: Cell<bool>,
+    /// Whether it asked for the end of the simulation after its initialisation (FMI 3).
+    ends_at_start: bool,
     // last: the folder outlives the library
     fmu: Arc<Fmu>,
 }
@@ -146,11 +150,7 @@ impl FmuInstance {
         if description.capabilities.needs_tool {
             log_needs_tool(&options.sink, description);
         }
-        let shown = intermediate::shown(description, &options.intermediate)?;
-        let mut announced = follow::announced(description, &options.followed)?;
-        announced.extend(&shown);
-        announced.sort_unstable();
-        announced.dedup();
+        let [shown, announced] = between(description, &options)?;
         let updates = description.capabilities.intermediate_update;
         let loaded = fmu.library()?;
         let api = functions::find(fmu, &loaded.library)?;
@@ -194,6 +194,8 @@ impl FmuInstance {
             early: Cell::new(false),
             untold: Cell::new(false),
             mode_told: Cell::new(false),
+            late_events: Cell::new(false),
+            ends_at_start: false,
             fmu: fmu.clone(),
         };
         if logs {
@@ -261,7 +263,7 @@ impl FmuInstance {
     pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
         if self.event_mode
             && !self.discrete_inputs.is_empty()
-            && self.before_set(references, Values::F64(values))?
+            && discrete::before_set(self, references, Values::F64(values))?
         {
             return Ok(());
         }
@@ -277,7 +279,10 @@ impl FmuInstance {
     /// [`ForeignInstance::set`].
     #[allow(clippy::missing_errors_doc)]
     pub fn set(&self, references: &[u32], values: Values) -> Result {
-        if self.event_mode && !self.discrete_inputs.is_empty() && self.before_set(references, values)? {
+        if self.event_mode
+            && !self.discrete_inputs.is_empty()
+            && discrete::before_set(self, references, values)?
+        {
             return Ok(());
         }
         self.foreign.set(references, values)
@@ -392,8 +397,11 @@ impl FmuInstance {
                     self.clocks.begin(self.start);
                     self.clocks.tick(&self.foreign, self.start, true)?;
                     self.clocks.forget_triggers();
-                    self.update_discrete_states(self.start)?;
-                    self.foreign.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+                    self.ends_at_start = self.update_discrete_states(self.start)?;
+                    if !self.ends_at_start {
+                        self.foreign
+                            .call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+                    }
                 }
             }
         }
@@ -440,13 +448,23 @@ impl FmuInstance {
                 self.foreign.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?
             }
         }
-        self.phase = InstancePhase::Instantiated;
+        (self.phase, self.ends_at_start) = (InstancePhase::Instantiated, false);
         self.foreign.log.updates.inner().followed.clear();
         self.description = self.fmu.description().clone();
         self.clocks = Clocks::new(&self.description.variables, self.event_mode, &self.foreign.log);
         self.foreign.recover();
         Ok(())
     }
+}
+
+/// Value references that are read at intermediate times, and those that are read or set there.
+fn between(description: &ModelDescription, options: &InstanceOptions) -> Result<[Vec<u32>; 2]> {
+    let shown = intermediate::shown(description, &options.intermediate)?;
+    let mut announced = follow::announced(description, &options.followed)?;
+    announced.extend(&shown);
+    announced.sort_unstable();
+    announced.dedup();
+    Ok([shown, announced])
 }
 
 impl Drop for FmuInstance {

@@ -135,6 +135,9 @@ impl FmuInstance {
             self.foreign.log.updates.forget_rows();
         }
         let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
+        if self.ends_at_start {
+            return Ok(Stepped { reached: t, terminate: true, events });
+        }
         if self.clocks.is_due() || self.clocks.told.changes.get() {
             events += 1;
             if self.fire(t)? {
@@ -142,14 +145,14 @@ impl FmuInstance {
             }
         }
         loop {
-            let tick = self.clocks.next(t, end);
-            let stop = if end - tick > tolerance { tick } else { end };
+            let stop = self.next_stop(t, end, tolerance);
             let StepPart { event, terminate, last, at_stop } = self.do_part(step, (t, stop), tolerance)?;
             if terminate {
                 return Ok(Stepped { reached: last, terminate, events });
             }
             let now = if at_stop { stop } else { last };
             let ticks = at_stop && self.clocks.tick_at(stop);
+            let announced = at_stop && self.clocks.told.event_is_due(stop);
             let settles = event && self.event_mode || ticks;
             if settles {
                 events += 1;
@@ -166,7 +169,7 @@ impl FmuInstance {
                 let outcome = format!("came no further than t = {last} s in the step to {end} s");
                 return Err(self.foreign.lied(DO_STEP_3, outcome));
             }
-            returns += u32::from(!at_stop);
+            returns += u32::from(!at_stop || announced);
             if let Some(outcome) = endless(reported, returns) {
                 return Err(self.foreign.lied(DO_STEP_3, outcome));
             }
@@ -174,6 +177,22 @@ impl FmuInstance {
             if self.updates && !settles {
                 self.set_followed(t)?;
             }
+        }
+    }
+
+    /// Where the part of a step to `end` ends that begins at t, s: at a tick, or at an event that the FMU has announced. One with steps of
+    /// one length has its events at communication points.
+    #[inline]
+    fn next_stop(&self, t: f64, end: f64, tolerance: f64) -> f64 {
+        let tick = self.clocks.next(t, end);
+        let stop = if end - tick > tolerance { tick } else { end };
+        match self.clocks.told.event_before(stop) {
+            Some(event) if self.description.capabilities.variable_step => event,
+            Some(_) => {
+                late_events(self);
+                stop
+            }
+            None => stop,
         }
     }
 
@@ -214,7 +233,8 @@ impl FmuInstance {
             last = untold(self, stop);
         }
         // continued from where it came to, it stays there: that is a time of its own solver
-        let stays = t > step.t && (last - t).abs() <= tolerance && !early && !terminate;
+        let stays =
+            t > step.t && stop - t > tolerance && (last - t).abs() <= tolerance && !early && !terminate;
         let ended = match stays {
             true => {
                 own_time(self, last, stop);
@@ -290,9 +310,11 @@ impl FmuInstance {
             self.foreign.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
         }
         self.clocks.tick_without_periodic(&self.foreign, t, true)?;
-        let end = self.update_discrete_states(t)?;
+        if self.update_discrete_states(t)? {
+            return Ok(true);
+        }
         self.foreign.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
-        Ok(end)
+        Ok(false)
     }
 
     /// Between two parts of a step: sets the inputs that the FMU follows; its last request may be of another time.
@@ -343,12 +365,26 @@ impl FmuInstance {
     }
 }
 
+/// Notes once that the events of an FMU with steps of one length are late.
+#[cold]
+fn late_events(instance: &FmuInstance) {
+    if !instance.late_events.replace(true) {
+        instance.foreign.log.note(
+            "announces an event within a step, and makes steps of one length: such events are handled at the end of the step",
+        );
+    }
+}
+
 /// Complaint about a step that has more parts than any can need.
 fn endless(events: u32, returns: u32) -> Option<String> {
     if events > ROUNDS {
         return Some(format!("found more than {ROUNDS} events in one step"));
     }
-    (returns > RETURNS).then(|| format!("returned early more than {RETURNS} times in one step"))
+    (returns > RETURNS).then(|| {
+        format!(
+            "returned early more than {RETURNS} times in one step, or as often at an event that was announced"
+        )
+    })
 }
 
 /// Notes once that all others would round otherwise.

@@ -62,7 +62,7 @@ fn of_nothing(element: &Element, d: &ModelDescription, lookup: &Lookup) -> Optio
         "`{}` is listed as the derivative of a state in ModelStructure and has no attribute `derivative`",
         printable(&v.name)
     );
-    v.derivative_of.is_none().then(|| Defect { kind: DefectKind::Derivative, line: Some(v.line), message })
+    v.derivative_of.is_none().then_some(Defect { kind: DefectKind::Derivative, line: Some(v.line), message })
 }
 
 fn is_derivative(element: &Element) -> bool {

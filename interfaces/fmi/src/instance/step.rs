@@ -145,7 +145,7 @@ impl FmuInstance {
             }
         }
         loop {
-            let stop = self.next_stop(t, end, tolerance);
+            let stop = next_stop(self, t, end, tolerance);
             let StepPart { event, terminate, last, at_stop } = self.do_part(step, (t, stop), tolerance)?;
             if terminate {
                 return Ok(Stepped { reached: last, terminate, events });
@@ -177,22 +177,6 @@ impl FmuInstance {
             if self.updates && !settles {
                 self.set_followed(t)?;
             }
-        }
-    }
-
-    /// Where the part of a step to `end` ends that begins at t, s: at a tick, or at an event that the FMU has announced. One with steps of
-    /// one length has its events at communication points.
-    #[inline]
-    fn next_stop(&self, t: f64, end: f64, tolerance: f64) -> f64 {
-        let tick = self.clocks.next(t, end);
-        let stop = if end - tick > tolerance { tick } else { end };
-        match self.clocks.told.event_before(stop) {
-            Some(event) if self.description.capabilities.variable_step => event,
-            Some(_) => {
-                late_events(self);
-                stop
-            }
-            None => stop,
         }
     }
 
@@ -362,6 +346,22 @@ impl FmuInstance {
             }
         }
         Err(self.foreign.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))
+    }
+}
+
+/// Where the part of a step to `end` ends that begins at t, s: at a tick, or at an event that the FMU has announced. One with steps of
+/// one length has its events at communication points.
+#[inline]
+fn next_stop(instance: &FmuInstance, t: f64, end: f64, tolerance: f64) -> f64 {
+    let tick = instance.clocks.next(t, end);
+    let stop = if end - tick > tolerance { tick } else { end };
+    match instance.clocks.told.event_before(stop) {
+        Some(event) if instance.description.capabilities.variable_step => event,
+        Some(_) => {
+            late_events(instance);
+            stop
+        }
+        None => stop,
     }
 }
 

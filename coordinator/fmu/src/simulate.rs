@@ -520,7 +520,7 @@ fn read(instance: &FmuInstance, v: &Variable, not_finite: impl Fn(f64) -> Result
 fn no_steps(start: f64, stop: f64, step: f64) -> String {
     match () {
         () if !(stop.is_finite() && stop > start) => {
-            format!("the run would end at {stop} s, and begins at {start} s: give a later, finite --stop")
+            format!("the run would end at {stop} s, and begins at {start} s: give a later --stop")
         }
         () if !(step.is_finite() && step > 0.0) => {
             format!("a step of {step} s is none: --step takes a number above 0")

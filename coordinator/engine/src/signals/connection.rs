@@ -280,13 +280,18 @@ impl Link {
 
     /// `a.y → b.u` of every value.
     pub fn names(&self, instances: &[Instance]) -> Vec<String> {
-        let name = |slot: usize, id: &u32| {
-            let variable = instances[slot].variables().iter().find(|v| v.id == *id);
-            format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
-        };
         let pairs = self.output_ids().iter().zip(self.input_ids());
-        pairs.map(|(from, to)| format!("{} → {}", name(self.from, from), name(self.to, to))).collect()
+        pairs.map(|(from, to)| named_ends([(self.from, *from), (self.to, *to)], instances)).collect()
     }
+}
+
+/// `a.y → b.u` of a value with these ends: subsystem and variable on either side.
+pub fn named_ends(ends: [(usize, u32); 2], instances: &[Instance]) -> String {
+    let [from, to] = ends.map(|(slot, id)| {
+        let variable = instances[slot].variables().iter().find(|v| v.id == id);
+        format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
+    });
+    format!("{from} → {to}")
 }
 
 /// All connections of a scenario, resolved.

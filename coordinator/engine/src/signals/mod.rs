@@ -17,7 +17,7 @@ mod table;
 mod traffic;
 
 pub use access::{Directory, VariableRef, streams};
-pub use connection::{Link, Links, connect, derivatives};
+pub use connection::{Link, Links, connect, derivatives, named_ends};
 pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
 pub use extrapolation::{Moment, held};

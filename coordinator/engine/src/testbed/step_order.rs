@@ -8,7 +8,7 @@
 use super::schedule::StepSchedule;
 use crate::graph::levels;
 use crate::listed::listed;
-use crate::signals::{ConnectedValue, Faults, FeedThroughs, Links, Place};
+use crate::signals::{ConnectedValue, Faults, FeedThroughs, Links, Place, named_ends};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 
@@ -132,12 +132,7 @@ fn warn_of_loops(inside: &[ConnectedValue], instances: &[Instance]) {
     if inside.is_empty() {
         return;
     }
-    let name = |(slot, id): (usize, u32)| {
-        let variable = instances[slot].variables().iter().find(|v| v.id == id);
-        format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
-    };
-    let names: Vec<String> =
-        inside.iter().map(|v| format!("{} → {}", name(v.ends[0]), name(v.ends[1]))).collect();
+    let names: Vec<String> = inside.iter().map(|v| named_ends(v.ends, instances)).collect();
     let numbers = inside.iter().all(|v| matches!(v.connection, Place::Number(_)));
     let solved = if numbers { "`order = \"iterate\"` solves the loop, " } else { "" };
     log::warn!(
